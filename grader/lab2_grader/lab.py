@@ -1,0 +1,231 @@
+"""Reads and validates the lab's facts: course, specification, rubric, limits and messages, all TOML beside this module."""
+
+from __future__ import annotations
+
+import functools
+from datetime import date
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from lab2_grader.errors import UsageError
+from lab2_grader.records import Limits, Record
+
+FACTS = Path(__file__).parent / "facts"
+
+T = TypeVar("T")
+
+
+class Course(Record):
+    """This year's course: the facts that change when the lab is rolled over."""
+
+    title: str
+    module_code: str
+    year: int
+    week: int
+    contact_name: str
+    contact_email: str
+    worksheet_url: str
+    template_clone_url: str
+    solutions_url: str
+    solutions_release: date
+    grader_install_url: str
+    course_organisations: tuple[str, ...]
+    workspace: str
+    ros_distro: str
+    fail_workflow_on_lost_points: bool
+
+
+class Pair(Record):
+    """A talker, a listener and the launch file that starts both, by name."""
+
+    talker: str
+    listener: str
+    launch_file: str
+
+
+class TextTopic(Record):
+    """The topic with greetings; `period_seconds` is that of the talker as handed out."""
+
+    name: str
+    type: str
+    period_seconds: float
+
+
+class NumberTopic(Record):
+    """The topic with numbers; the count runs from `smallest` to `largest` and back to `smallest`."""
+
+    name: str
+    type: str
+    smallest: int
+    largest: int
+
+
+class Specification(Record):
+    """What the worksheet asks of the package."""
+
+    package: str
+    original: Pair
+    numeric: Pair
+    text_topic: TextTopic
+    number_topic: NumberTopic
+
+
+class IntakeLimits(Record):
+    """Bounds of what may be handed in, and of how long a clone may take."""
+
+    archive_bytes: int
+    unpacked_bytes: int
+    members: int
+    ratio: int
+    path_length: int
+    clone_seconds: float
+    source_file_bytes: int
+
+
+class BuildLimits(Record):
+    """Bounds of `colcon build`."""
+
+    seconds: float
+    output_bytes: int
+    disk_bytes: int
+    install_bytes: int
+
+
+class StartLimits(Record):
+    """From starting the nodes to a complete graph."""
+
+    seconds: float
+
+
+class ConversationLimits(Record):
+    """Bounds and amounts of the conversation and of the talker alone."""
+
+    timelapse_seconds: float
+    realtime_seconds: float
+    slow_ticks: int
+    wraps: int
+    silence_seconds: float
+    answer_seconds: float
+
+
+class ListenerLimits(Record):
+    """Amounts of the listener alone."""
+
+    numbers: int
+    texts: int
+    answer_seconds: float
+
+
+class OriginalsLimits(Record):
+    """Bounds of the originals."""
+
+    seconds: float
+    messages: int
+
+
+class StopLimits(Record):
+    """How long each rung of the ladder INT, TERM, KILL waits."""
+
+    interrupt_seconds: float
+    terminate_seconds: float
+
+
+class ResourceLimits(Record):
+    """What the whole tree of a submission's processes may use."""
+
+    processes: int
+    memory_bytes: int
+    file_bytes: int
+    scratch_bytes: int
+    output_bytes: int
+    line_bytes: int
+
+    def limits(self, seconds: float, output_bytes: int | None = None) -> Limits:
+        """These limits for one run of at most *seconds*, keeping *output_bytes* of its output."""
+        return Limits(
+            seconds=seconds,
+            output_bytes=self.output_bytes if output_bytes is None else output_bytes,
+            processes=self.processes,
+            memory_bytes=self.memory_bytes,
+            file_bytes=self.file_bytes,
+        )
+
+
+class AllLimits(Record):
+    """`limits.toml`."""
+
+    intake: IntakeLimits
+    build: BuildLimits
+    start: StartLimits
+    conversation: ConversationLimits
+    listener: ListenerLimits
+    originals: OriginalsLimits
+    stop: StopLimits
+    resources: ResourceLimits
+
+
+class ChecklistItem(Record):
+    """An item of the worksheet's checklist (6.8)."""
+
+    item: str
+    text: str
+
+
+class RubricCheck(Record):
+    """A check as the rubric has it: what it is worth and which item it serves."""
+
+    id: str
+    item: str
+    title: str
+    section: str
+    points: int
+
+
+class Rubric(Record):
+    """The checklist and the checks, in the order in which reports show them."""
+
+    checklist: tuple[ChecklistItem, ...]
+    check: tuple[RubricCheck, ...]
+
+
+def _read(path: Path, kind: type[T]) -> T:
+    """Decode *path* as *kind*.
+
+    Raises:
+        UsageError: It cannot be read, is no TOML, or has a key or value that is not allowed; the text names it.
+    """
+    try:
+        return msgspec.toml.decode(path.read_bytes(), type=kind)
+    except OSError as error:
+        raise UsageError(f"{path} cannot be read: {error.strerror}.") from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path.name} is not valid: {error}.") from error
+
+
+@functools.cache
+def course() -> Course:
+    """The facts of this year's course."""
+    return _read(FACTS / "course.toml", Course)
+
+
+@functools.cache
+def specification() -> Specification:
+    """What the worksheet asks of the package."""
+    return _read(FACTS / "specification.toml", Specification)
+
+
+@functools.cache
+def limits() -> AllLimits:
+    """Budgets of time and limits of resources."""
+    return _read(FACTS / "limits.toml", AllLimits)
+
+
+def rubric(path: Path | None = None) -> Rubric:
+    """The rubric of *path*, or the lab's own.
+
+    Raises:
+        UsageError: The file does not validate.
+    """
+    return _read(path or FACTS / "rubric.toml", Rubric)

@@ -1,0 +1,567 @@
+"""Every frozen value that crosses a stage, in the order in which the stages make them.
+
+submission → build → scenes → evidence → checks → score → reports
+
+Times inside a scene (`at`) are seconds since that scene began, on the monotonic clock. Durations are seconds.
+Sequences are tuples; nothing here prints, renders or reads a file.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import msgspec
+
+EVIDENCE_SCHEMA = "lab2-grader/evidence/1"
+RESULT_SCHEMA = "lab2-grader/result/1"
+
+
+class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Base of the records that are written as JSON objects."""
+
+
+class Row(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=True):
+    """Base of what is observed in a scene; written as one JSON array a line, its kind first."""
+
+
+# --- processes ----------------------------------------------------------------------------------
+
+
+class Limits(Record):
+    """What one run of a process and all its descendants may use.
+
+    Args:
+        seconds: Wall-clock time before it is stopped.
+        output_bytes: How much of its output is kept, both streams together.
+        processes: Processes and threads at once; 0 for no limit.
+        memory_bytes: Resident memory of all together; 0 for no limit.
+        file_bytes: Size of any one file it writes; 0 for no limit.
+    """
+
+    seconds: float
+    output_bytes: int = 1_000_000
+    processes: int = 0
+    memory_bytes: int = 0
+    file_bytes: int = 0
+
+
+class Request(Record):
+    """A process to be started: the only way in which this package starts one.
+
+    Args:
+        argv: Program and arguments.
+        env: The whole environment, nothing is inherited.
+        cwd: Working directory.
+        limits: What it may use.
+    """
+
+    argv: tuple[str, ...]
+    env: tuple[tuple[str, str], ...]
+    cwd: str
+    limits: Limits
+
+
+class EndedBy(str, Enum):
+    """Who ended a process."""
+
+    ITSELF = "itself"
+    GRADER = "grader"  # the scene was over, or the run was interrupted
+    DEADLINE = "deadline"  # its time was up
+    LIMIT = "limit"  # it used more than it may of something else
+
+
+class Outcome(Record):
+    """How a process ended.
+
+    Args:
+        code: Exit code; None when a signal ended it.
+        signal: Number of the signal that ended it; None when it exited.
+        ended_by: Who ended it.
+        limit: Which limit was struck (`memory`, `processes`, …) when `ended_by` is LIMIT, else empty.
+        stdout: What was kept of standard output.
+        stderr: What was kept of standard error.
+        dropped_bytes: Output beyond the limit, thrown away.
+        seconds: From start to end.
+    """
+
+    code: int | None
+    signal: int | None
+    ended_by: EndedBy
+    limit: str
+    stdout: bytes
+    stderr: bytes
+    dropped_bytes: int
+    seconds: float
+
+
+# --- submission ---------------------------------------------------------------------------------
+
+
+class SourceFile(Record):
+    """A text file of the package, kept so that hints can name lines; `path` is relative to the package."""
+
+    path: str
+    text: str
+
+
+class GitFacts(Record):
+    """What the repository whose top folder is the submission says of itself.
+
+    Args:
+        commit: Full id of HEAD; None when nothing was ever committed.
+        remotes: Addresses of the remotes, without user names and passwords.
+        committed_work: Those files of the exercise (6.7) that HEAD holds, relative to the package.
+        uncommitted: Changed or untracked files of the package that HEAD does not hold so, at most 20.
+        pushed: HEAD is on a branch of a remote, as far as the repository knows.
+        products: Committed build products and caches, at most 20.
+        products_count: How many there are in all.
+    """
+
+    commit: str | None
+    remotes: tuple[str, ...]
+    committed_work: tuple[str, ...]
+    uncommitted: tuple[str, ...]
+    pushed: bool
+    products: tuple[str, ...]
+    products_count: int
+
+
+class SubmissionFacts(Record):
+    """What was handed in, as far as it concerns the verdicts.
+
+    Args:
+        name: A short name for people and for folders of results.
+        source: What the grader was given: a path or an address, without secrets.
+        sha256: Digest over the names and contents of the package's files.
+        commit: Full commit id when the submission is a git repository, else None.
+        package_path: Where the package was found, relative to the top of the submission; "." for the top.
+        git: None when no git history came with it.
+        sources: The package's Python files, `setup.py`, `setup.cfg` and `package.xml`, bounded in size.
+    """
+
+    name: str
+    source: str
+    sha256: str
+    commit: str | None
+    package_path: str
+    git: GitFacts | None
+    sources: tuple[SourceFile, ...]
+
+
+class Submission(Record):
+    """A package found and taken over, ready to be built.
+
+    Args:
+        facts: What is recorded of it.
+        package_dir: Absolute path of a clean copy of the package: regular files and folders only.
+    """
+
+    facts: SubmissionFacts
+    package_dir: str
+
+
+# --- build --------------------------------------------------------------------------------------
+
+
+class EntryPoint(Record):
+    """One line of `console_scripts`: `name = target`."""
+
+    name: str
+    target: str
+
+
+class Build(Record):
+    """What `colcon build` made of the package.
+
+    Args:
+        ok: colcon ended with 0 and installed the package.
+        code: Its exit code; None when it was ended by a signal or by us.
+        ended_by: Who ended it.
+        limit: Which limit it struck, else empty.
+        seconds: How long it took.
+        log: The end of what it printed, cleaned.
+        executables: Names in `lib/lab2`, what `ros2 run` offers, sorted.
+        entry_points: The console scripts that were installed.
+        modules: Python modules of the package that were installed, without the package's name, sorted.
+        launch_files: Files below `share/lab2` that end in `.py`, `.xml`, `.yaml` or `.yml`, sorted.
+    """
+
+    ok: bool
+    code: int | None
+    ended_by: EndedBy
+    limit: str
+    seconds: float
+    log: str
+    executables: tuple[str, ...]
+    entry_points: tuple[EntryPoint, ...]
+    modules: tuple[str, ...]
+    launch_files: tuple[str, ...]
+
+
+# --- scenes: what an observer saw ---------------------------------------------------------------
+
+
+class SceneName(str, Enum):
+    """The scenes of DESIGN section 4."""
+
+    CONVERSATION = "conversation"
+    LISTENER = "listener"
+    TALKER = "talker"
+    ORIGINALS = "originals"
+
+
+class Clock(str, Enum):
+    """Who drives the ROS clock of a scene."""
+
+    TIME_LAPSE = "time-lapse"
+    REAL_TIME = "real-time"
+
+
+class Phase(Row):
+    """A part of the scene begins: `start`, `graph`, `period`, `slow`, `fast`, `real-time`, `send`, `stop`."""
+
+    at: float
+    name: str
+
+
+class Endpoint(Row):
+    """A publisher or subscription appears in the graph, or leaves it.
+
+    Args:
+        at: When it was seen.
+        event: `appeared` or `gone`.
+        kind: `publisher` or `subscription`.
+        gid: Its identity in the middleware, hexadecimal.
+        node: Fully qualified name of the node.
+        topic: Fully qualified name of the topic.
+        type: Type of the topic, for example `std_msgs/msg/Int8`.
+        reliability: `reliable` or `best-effort`.
+        durability: `volatile` or `transient-local`.
+    """
+
+    at: float
+    event: str
+    kind: str
+    gid: str
+    node: str
+    topic: str
+    type: str
+    reliability: str
+    durability: str
+
+
+class Message(Row):
+    """A message arrived at the observer.
+
+    Args:
+        at: When it arrived.
+        topic: Fully qualified name of the topic.
+        type: Type of the topic.
+        number: How many messages the publisher had published with this one, from 1.
+        data: Its `data` field; None when it has none that is a number or a text.
+    """
+
+    at: float
+    topic: str
+    type: str
+    number: int
+    data: int | float | str | None
+
+
+class Line(Row):
+    """A line that a process of the submission printed.
+
+    Args:
+        at: When it was read.
+        source: The executable's name as the launcher labels it (`numeric_listener`), or `launch` for the launcher's own.
+        stream: `stdout` or `stderr` as the grader read it.
+        text: The line, cleaned: printable characters only, cut at the limit.
+    """
+
+    at: float
+    source: str
+    stream: str
+    text: str
+
+
+class Tick(Row):
+    """The grader moved the ROS clock; `clock` is its new time, in seconds."""
+
+    at: float
+    clock: float
+
+
+class Sent(Row):
+    """The grader published a message of its own."""
+
+    at: float
+    topic: str
+    data: int | str
+
+
+class ProcessSeen(Row):
+    """A process of the submission was seen running; `executable` is its name when it is one of the package's, else empty."""
+
+    at: float
+    pid: int
+    executable: str
+    command: str
+
+
+class ProcessGone(Row):
+    """A process seen before is no longer there; `by` says whether it ended by itself or the scene was being stopped."""
+
+    at: float
+    pid: int
+    by: EndedBy
+
+
+class ProgramEnded(Row):
+    """What the scene started (the launch, or the one executable) ended.
+
+    Args:
+        at: When.
+        code: Exit code, None when a signal ended it.
+        signal: Signal number, None when it exited.
+        by: Who ended it.
+        limit: Which limit it struck, else empty.
+    """
+
+    at: float
+    code: int | None
+    signal: int | None
+    by: EndedBy
+    limit: str
+
+
+class Measured(Row):
+    """A number the observer worked out: `graph_seconds`, `period_seconds`, `follows_ros_clock` (1 or 0), `dropped_bytes`."""
+
+    at: float
+    name: str
+    value: float
+
+
+class Unsupported(Row):
+    """Our own launcher met something of the launch API that it does not know: our limit, not the student's fault."""
+
+    at: float
+    what: str
+
+
+Event = (
+    Phase | Endpoint | Message | Line | Tick | Sent | ProcessSeen | ProcessGone | ProgramEnded | Measured | Unsupported
+)
+
+
+class ScenePlan(Record):
+    """What an observer is told to do.
+
+    Args:
+        scene: Which scene to play.
+        clock: Who drives the ROS clock.
+        program: What to start in the submission's sandbox.
+        label: The executable's name when the program is one executable; empty when it is a launch.
+        numbers: Numbers to publish (listener).
+        texts: Strings to publish (listener).
+    """
+
+    scene: SceneName
+    clock: Clock
+    program: Request
+    label: str
+    numbers: tuple[int, ...] = ()
+    texts: tuple[str, ...] = ()
+
+
+class Scene(Record):
+    """One scene as it was played.
+
+    Args:
+        name: Which scene.
+        started_with: `launch`, `executable` or `module`: how the submission's nodes were started.
+        clock: Who was to drive the ROS clock.
+        complete: The observer came to the end of its plan.
+        fault: What of ours failed, in a sentence; empty when nothing did.
+        seconds: How long the scene took.
+        events: What was observed, in order.
+    """
+
+    name: SceneName
+    started_with: str
+    clock: Clock
+    complete: bool
+    fault: str
+    seconds: float
+    events: tuple[Event, ...]
+
+
+# --- evidence -----------------------------------------------------------------------------------
+
+
+class Runtime(Record):
+    """With what the submission was run.
+
+    Args:
+        ros: `sourced` or `wheels`.
+        distro: Name of the ROS distribution.
+        clock: How the numeric pair's clock was driven: `time-lapse` or `real-time`.
+        isolation: `bubblewrap` or `off`.
+        grader: Version of the grader.
+    """
+
+    ros: str
+    distro: str
+    clock: str
+    isolation: str
+    grader: str
+
+
+class Seconds(Record):
+    """How long the stages took; `run` is all scenes, side by side."""
+
+    build: float
+    run: float
+    total: float
+
+
+class Evidence(Record):
+    """All that was observed of one submission. Checks see this and nothing else.
+
+    Args:
+        submission: What was handed in.
+        build: None when the build was never reached.
+        scenes: Those that were played, at most one of each name.
+        runtime: With what.
+        faults: What of ours failed outside a scene, a sentence each.
+        seconds: How long it took.
+    """
+
+    submission: SubmissionFacts
+    build: Build | None
+    scenes: tuple[Scene, ...]
+    runtime: Runtime
+    faults: tuple[str, ...]
+    seconds: Seconds
+
+    def scene(self, name: SceneName) -> Scene | None:
+        """The scene of that name, or None when it was not played."""
+        return next((scene for scene in self.scenes if scene.name is name), None)
+
+
+# --- verdicts and score -------------------------------------------------------------------------
+
+
+class Status(str, Enum):
+    """What can become of a check (DESIGN section 3)."""
+
+    PASS = "pass"
+    PARTIAL = "partial"
+    FAIL = "fail"
+    BLOCKED = "blocked"
+    NOT_ASSESSED = "not-assessed"
+    INCONCLUSIVE = "inconclusive"
+
+
+class Verdict(Record):
+    """What one check says.
+
+    Args:
+        check: Its id.
+        status: What became of it.
+        message: Key of the message in the catalogue, for example `talker-wrap.overflow`; empty on a pass.
+        expected: What the worksheet asks, for people.
+        observed: What was seen, for people.
+        hint: What to try next, for people; empty on a pass.
+        because: Ids of the checks that block it.
+        file: Path within the package where the cause stands; empty when unknown.
+        line: Line in that file, from 1; 0 when unknown.
+    """
+
+    check: str
+    status: Status
+    message: str = ""
+    expected: str = ""
+    observed: str = ""
+    hint: str = ""
+    because: tuple[str, ...] = ()
+    file: str = ""
+    line: int = 0
+
+
+class CheckResult(Record):
+    """A verdict with its points, as `result.json` has it."""
+
+    id: str
+    item: str
+    title: str
+    status: Status
+    points: int
+    max_points: int
+    expected: str
+    observed: str
+    hint: str
+    section: str
+    message: str
+    because: tuple[str, ...]
+    file: str
+    line: int
+
+
+class ItemResult(Record):
+    """An item of the worksheet's checklist with the points of its checks."""
+
+    item: str
+    text: str
+    status: Status
+    points: int
+    max_points: int
+
+
+class SubmissionResult(Record):
+    """The submission as `result.json` names it."""
+
+    name: str
+    source: str
+    sha256: str
+    commit: str | None
+
+
+class Digests(Record):
+    """SHA-256 of what the result was made from, hexadecimal."""
+
+    submission: str
+    evidence: str
+    rubric: str
+
+
+class Result(Record):
+    """`result.json`: the contract of DESIGN section 3.
+
+    Args:
+        schema: Always `RESULT_SCHEMA`.
+        submission: What was graded.
+        graded: False when the mark is withheld.
+        score: Points; None when the mark is withheld.
+        max_score: Points that could be had: 100 less what was not assessed.
+        checklist: The worksheet's checklist, in its order.
+        checks: All checks, in the rubric's order.
+        notes: Information without points, and why a mark is withheld.
+        runtime: With what it was run.
+        seconds: How long it took.
+        digests: What the result was made from.
+        signature: HMAC-SHA-256 over the rest when a key was given, else empty.
+    """
+
+    schema: str
+    submission: SubmissionResult
+    graded: bool
+    score: int | None
+    max_score: int
+    checklist: tuple[ItemResult, ...]
+    checks: tuple[CheckResult, ...]
+    notes: tuple[str, ...]
+    runtime: Runtime
+    seconds: Seconds
+    digests: Digests
+    signature: str = ""
