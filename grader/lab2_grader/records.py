@@ -20,7 +20,7 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Base of the records that are written as JSON objects."""
 
 
-class Row(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag=True):
+class Row(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True, tag_field="row", tag=True):
     """Base of what is observed in a scene; written as one JSON array a line, its kind first."""
 
 
