@@ -19,11 +19,15 @@ class Listener(Node):
 
 
 def main(args=None):
+    rclpy.init(args=args)
+    listener = Listener()
     try:
-        with rclpy.init(args=args):
-            rclpy.spin(Listener())
+        rclpy.spin(listener)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    finally:
+        listener.destroy_node()
+        rclpy.try_shutdown()
 
 
 if __name__ == '__main__':

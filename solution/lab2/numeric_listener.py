@@ -24,11 +24,15 @@ class NumericListener(Node):
 
 
 def main(args=None):
+    rclpy.init(args=args)
+    numeric_listener = NumericListener()
     try:
-        with rclpy.init(args=args):
-            rclpy.spin(NumericListener())
+        rclpy.spin(numeric_listener)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    finally:
+        numeric_listener.destroy_node()
+        rclpy.try_shutdown()
 
 
 if __name__ == '__main__':

@@ -38,11 +38,15 @@ class NumericTalker(Node):
 
 
 def main(args=None):
+    rclpy.init(args=args)
+    numeric_talker = NumericTalker()
     try:
-        with rclpy.init(args=args):
-            rclpy.spin(NumericTalker())
+        rclpy.spin(numeric_talker)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    finally:
+        numeric_talker.destroy_node()
+        rclpy.try_shutdown()
 
 
 if __name__ == '__main__':

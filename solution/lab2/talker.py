@@ -26,11 +26,15 @@ class Talker(Node):
 
 
 def main(args=None):
+    rclpy.init(args=args)
+    talker = Talker()
     try:
-        with rclpy.init(args=args):
-            rclpy.spin(Talker())
+        rclpy.spin(talker)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    finally:
+        talker.destroy_node()
+        rclpy.try_shutdown()
 
 
 if __name__ == '__main__':
