@@ -97,6 +97,7 @@ class StartLimits(Record):
     """From starting the nodes to a complete graph."""
 
     seconds: float
+    settle_seconds: float
 
 
 class ConversationLimits(Record):

@@ -1,0 +1,123 @@
+"""Builds a submission with `colcon build` in a throwaway workspace and says what was installed.
+
+The workspace lives in the sandbox and is gone with it; what colcon installed comes out as an archive on standard
+output, and is unpacked by rule (no links out, bounded size). Building runs the submission's `setup.py`, so it is as
+hostile as everything else.
+"""
+
+from __future__ import annotations
+
+import configparser
+import io
+import sys
+import tarfile
+from pathlib import Path
+
+from lab2_grader import lab, process, sandbox
+from lab2_grader.errors import FaultError
+from lab2_grader.records import Build, EndedBy, EntryPoint, Request, Submission
+from lab2_grader.ros import Ros
+from lab2_grader.text import clean
+
+LOG_BYTES = 20_000  # the end of what the build printed is kept
+PACKAGE_INSIDE = "/package"
+LAUNCH_SUFFIXES = (".py", ".xml", ".yaml", ".yml")
+
+# The whole build: a clean workspace with nothing but the package, built without symlinks, then handed out.
+SCRIPT = """
+set -e
+mkdir -p "$1/src" && cd "$1"
+cp -R "$2" "src/$3"
+set +e
+colcon build --packages-select "$3" --event-handlers console_direct+ console_cohesion- 1>&2
+code=$?
+[ -d install ] && tar -cf - install
+exit $code
+"""
+
+
+def build(submission: Submission, into: Path, ros: Ros, isolation: sandbox.Isolation) -> Build:
+    """Build *submission* and unpack what was installed below *into*.
+
+    Raises:
+        FaultError: colcon is not there, or the machine failed.
+    """
+    limits = lab.limits()
+    package = lab.specification().package
+    workspace, source = (sandbox.WORKSPACE, PACKAGE_INSIDE) if isolation.on else (str(into), submission.package_dir)
+    request = Request(
+        argv=("sh", "-c", SCRIPT, "build", workspace, source, package),
+        env=ros.environment(sandbox.HOME if isolation.on else str(into)),
+        cwd="/",
+        limits=limits.resources.limits(limits.build.seconds, limits.build.install_bytes + limits.build.output_bytes),
+    )
+    mounts = (sandbox.Mount(submission.package_dir, PACKAGE_INSIDE), *(sandbox.Mount(path) for path in ros.reads()))
+    confined = sandbox.confine(request, mounts, isolation, network=False, workspace_bytes=limits.build.disk_bytes)
+    outcome = process.run(confined)
+    printed = outcome.stderr[-LOG_BYTES:].decode(errors="replace")
+    log = "\n".join(clean(line, 2_000) for line in printed.splitlines())
+    if outcome.code == 127 or "colcon: not found" in log:
+        raise FaultError("colcon is not installed where the grader looks for it. Run `make setup`.", "build")
+    prefix = into / "install" / package
+    unpacked = not outcome.dropped_bytes and _unpack(outcome.stdout, into)
+    ended_by = EndedBy.LIMIT if outcome.dropped_bytes else outcome.ended_by
+    ok = outcome.code == 0 and unpacked and prefix.is_dir()
+    return Build(
+        ok=ok,
+        code=outcome.code,
+        ended_by=ended_by,
+        limit="install" if outcome.dropped_bytes else outcome.limit,
+        seconds=outcome.seconds,
+        log=log,
+        executables=_names(prefix / "lib" / package) if ok else (),
+        entry_points=_entry_points(prefix) if ok else (),
+        modules=_modules(prefix, package) if ok else (),
+        launch_files=_launch_files(prefix / "share" / package) if ok else (),
+    )
+
+
+def _unpack(archive: bytes, into: Path) -> bool:
+    """Unpack what the build handed out; False when it is no archive or breaks a rule."""
+    try:
+        with tarfile.open(fileobj=io.BytesIO(archive)) as members:
+            members.extractall(into, filter="data")
+    except (tarfile.TarError, OSError, ValueError):
+        return False
+    return True
+
+
+def _names(folder: Path) -> tuple[str, ...]:
+    if not folder.is_dir():
+        return ()
+    return tuple(sorted(clean(p.name, 100) for p in folder.iterdir() if p.is_file() and p.stat().st_mode & 0o111))
+
+
+def _site_packages(prefix: Path) -> Path:
+    return prefix / "lib" / f"python{sys.version_info.major}.{sys.version_info.minor}" / "site-packages"
+
+
+def _entry_points(prefix: Path) -> tuple[EntryPoint, ...]:
+    found = []
+    for path in sorted(_site_packages(prefix).glob("*-info/entry_points.txt")):
+        parser = configparser.RawConfigParser(delimiters=("=",), strict=False)
+        parser.optionxform = str  # type: ignore[assignment,method-assign]
+        try:
+            parser.read_string(path.read_text(encoding="utf-8", errors="replace"))
+        except configparser.Error:
+            continue
+        if parser.has_section("console_scripts"):
+            items = parser.items("console_scripts")
+            found += [EntryPoint(clean(name, 100), clean(target or "", 200)) for name, target in items]
+    return tuple(found)
+
+
+def _modules(prefix: Path, package: str) -> tuple[str, ...]:
+    folder = _site_packages(prefix) / package
+    return tuple(sorted(clean(path.stem, 100) for path in folder.glob("*.py")))
+
+
+def _launch_files(share: Path) -> tuple[str, ...]:
+    if not share.is_dir():
+        return ()
+    found = (p for p in share.rglob("*") if p.is_file() and p.suffix in LAUNCH_SUFFIXES)
+    return tuple(sorted(clean(str(p.relative_to(share)), 200) for p in found)[:100])

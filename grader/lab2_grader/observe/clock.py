@@ -1,0 +1,181 @@
+"""The ROS clock in the grader's hand: moved in lock-step with what the talker publishes.
+
+A timer of a node that follows the ROS clock fires once for each step that is at least its period long, however long
+the machine takes to let it: the step waits for the message, not the message for the step. A node that does not follow
+the ROS clock ticks while the clock stands still, and is then simply listened to in real time. Both ways record the
+same sequence; only the time they take differs.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from lab2_grader import lab
+from lab2_grader.observe.observer import Observer
+from lab2_grader.records import Clock, Measured, Message, Phase, Tick
+
+FIRST_JUMP_SECONDS = 10.0
+PROBE_SECONDS = 0.05  # ROS time moved at a time while the period is measured
+PROBE_WAIT_SECONDS = 0.01
+STEP_WAIT_SECONDS = 0.05
+FIRST_WAIT_SECONDS = 1.0
+HOLD_SECONDS = 0.1  # how long the clock stands still, at least, to see whether the node does too
+UNASKED_LIMIT = 5  # so many messages while the clock stands still: the node has a clock of its own
+TARDY_STEPS = 3  # a message that took more steps than this was not asked for by them
+TARDY_LIMIT = 5
+REAL_TIME_HERTZ = 20
+
+OnNumber = Callable[[Message], None]
+
+
+class LockStep:
+    """Plays the ticks of a talker.
+
+    Args:
+        observer: Hears what the talker publishes.
+        clock: TIME_LAPSE to drive the ROS clock, REAL_TIME to leave it alone.
+    """
+
+    def __init__(self, observer: Observer, clock: Clock) -> None:
+        self._observer = observer
+        self._limits = lab.limits().conversation
+        self._drives = clock is Clock.TIME_LAPSE
+        self._follows = self._drives
+        self._publisher = observer.publisher("/clock", "rosgraph_msgs/msg/Clock") if self._drives else None
+        self._now = 0.0
+        self._period = 0.0
+        self._tardy = 0
+
+    def followers(self) -> int:
+        """How many nodes listen to the clock."""
+        return self._publisher.get_subscription_count() if self._publisher else 0
+
+    def play(self, topic: str, on_slow: OnNumber | None) -> None:
+        """Let the talker tick until its count must have wrapped, or it falls silent, or time is up.
+
+        Args:
+            topic: Where the numbers are expected.
+            on_slow: Called with each number of the slow part, before the next tick; None for no slow part.
+        """
+        number_topic = lab.specification().number_topic
+        length = number_topic.largest - number_topic.smallest + 1
+        self._topic = topic
+        self._deadline = time.monotonic() + self._limits.timelapse_seconds
+        if self._drives:
+            self._phase("period")
+            self._find_period()
+        if not self._follows:
+            self._begin_real_time()
+        if on_slow is not None:
+            self._phase("slow")
+            for _ in range(self._limits.slow_ticks):
+                if not self._next_tick():
+                    break
+                numbers = self._heard()
+                if numbers:
+                    on_slow(numbers[-1])
+        self._phase("fast")
+        while self._next_tick():
+            wanted = length * self._limits.wraps + length // 8 if self._follows else length + 4
+            if len(self._heard()) >= wanted:
+                break
+        self._record("follows_ros_clock", float(self._follows))
+
+    # --- ticks ------------------------------------------------------------------------------
+
+    def _heard(self) -> list[Message]:
+        """The numbers so far; every message while there is no number, so that silence can be told from slowness."""
+        messages = self._observer.messages
+        numbers = [message for message in messages if message.topic == self._topic]
+        return numbers or messages
+
+    def _next_tick(self) -> bool:
+        """Move the clock until the talker speaks; False when it is silent, has ended, or time is up."""
+        before = len(self._heard())
+        began = time.monotonic()
+        steps = 0
+        while len(self._heard()) == before:
+            now = time.monotonic()
+            if now > self._deadline or now - began > self._silence() or not self._observer.alive():
+                return False
+            if self._follows:
+                self._advance(self._period)
+                steps += 1
+            self._wait(before, STEP_WAIT_SECONDS)
+        if self._follows:
+            self._tardy = self._tardy + 1 if steps > TARDY_STEPS else 0
+            if self._tardy >= TARDY_LIMIT:
+                self._begin_real_time()
+        return True
+
+    def _silence(self) -> float:
+        """How long the talker may be silent before it counts as having stopped."""
+        return max(self._limits.silence_seconds, 2.5 * self._period if not self._follows else 0.0)
+
+    def _wait(self, before: int, seconds: float) -> bool:
+        """Wait for a message beyond the first *before*; in real time the clock goes on meanwhile."""
+        deadline = time.monotonic() + seconds
+        while len(self._heard()) == before:
+            left = deadline - time.monotonic()
+            if left <= 0:
+                return False
+            if self._drives and not self._follows and time.monotonic() >= self._next_clock:
+                self._advance(1 / REAL_TIME_HERTZ)
+                self._next_clock += 1 / REAL_TIME_HERTZ
+            self._observer.spin(min(left, 1 / REAL_TIME_HERTZ))
+        return True
+
+    def _advance(self, seconds: float) -> None:
+        assert self._publisher is not None
+        from rosgraph_msgs.msg import Clock as ClockMessage
+
+        self._now = round(self._now + seconds, 6)
+        message = ClockMessage()
+        message.clock.sec = int(self._now)
+        message.clock.nanosec = round((self._now - int(self._now)) * 1e9)
+        self._publisher.publish(message)
+        self._observer.recorder.write(Tick(self._observer.recorder.now(), self._now))
+
+    # --- the period, and whether the node follows -----------------------------------------
+
+    def _find_period(self) -> None:
+        """Measure the period in ROS time, twice, and see whether the node stands still when the clock does."""
+        self._advance(FIRST_JUMP_SECONDS)
+        self._wait(len(self._heard()), FIRST_WAIT_SECONDS)
+        intervals = []
+        took = 0.0
+        for _ in range(3):
+            before, began, probes = len(self._heard()), time.monotonic(), 0
+            while len(self._heard()) == before:
+                if time.monotonic() - began > self._limits.silence_seconds or not self._observer.alive():
+                    self._period = self._period or 1.0
+                    return
+                self._advance(PROBE_SECONDS)
+                probes += 1
+                self._wait(before, PROBE_WAIT_SECONDS)
+            intervals.append(probes)
+            took = time.monotonic() - began
+        # The interval after the first jump may be short of a whole period, so it does not count.
+        self._period = round(max(intervals[1:]) * PROBE_SECONDS, 6)
+        self._follows = self._stands_still(max(HOLD_SECONDS, 1.5 * took))
+        self._record("period_seconds", self._period if self._follows else round(took, 2))
+
+    def _stands_still(self, seconds: float) -> bool:
+        """Whether nothing comes for *seconds* while the clock does not move; a few late messages are let pass."""
+        for _ in range(UNASKED_LIMIT):
+            if not self._wait(len(self._heard()), seconds):
+                return True
+        return False
+
+    def _begin_real_time(self) -> None:
+        self._phase("real-time")
+        self._follows = False
+        self._deadline = time.monotonic() + self._limits.realtime_seconds
+        self._next_clock = time.monotonic()
+
+    def _phase(self, name: str) -> None:
+        self._observer.recorder.write(Phase(self._observer.recorder.now(), name))
+
+    def _record(self, name: str, value: float) -> None:
+        self._observer.recorder.write(Measured(self._observer.recorder.now(), name, value))

@@ -1,0 +1,283 @@
+"""The observer: a node that sees the graph, hears every topic, and watches the program of the submission."""
+
+from __future__ import annotations
+
+import importlib
+import queue
+import re
+import secrets
+import time
+from collections.abc import Callable
+from pathlib import PurePosixPath
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from lab2_grader import lab, process
+from lab2_grader.observe.output import OutputLines
+from lab2_grader.observe.recorder import Recorder
+from lab2_grader.records import (
+    EndedBy,
+    Endpoint,
+    Line,
+    Measured,
+    Message,
+    ProcessGone,
+    ProcessSeen,
+    ProgramEnded,
+    Request,
+    Unsupported,
+)
+from lab2_grader.text import clean
+
+HOUSEKEEPING_TOPICS = ("/rosout", "/parameter_events", "/clock")
+TYPE_NAME = re.compile(r"^([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)$")
+QUEUE_DEPTH = 1000  # the observer never loses what it could have heard
+GRAPH_POLL_SECONDS = 0.02
+PROCESS_POLL_SECONDS = 0.1
+UNSUPPORTED = "[lab2-launcher] unsupported: "
+
+Handle = tuple[str, str, bool, bool]
+
+
+class Observer:
+    """Hears, sees and remembers one scene.
+
+    Args:
+        recorder: Where everything observed goes.
+
+    What a scene's script needs to decide what to do next is kept here too: `messages`, `lines`, `endpoints`.
+    """
+
+    def __init__(self, recorder: Recorder) -> None:
+        self.recorder = recorder
+        self.messages: list[Message] = []
+        self.lines: list[Line] = []
+        self.endpoints: dict[str, Endpoint] = {}
+        self.graph_changed_at = 0.0
+        self.ended: ProgramEnded | None = None
+        self._context = Context()
+        # Without log files there is nothing that the observer must be able to write.
+        rclpy.init(args=["--ros-args", "--disable-external-lib-logs"], context=self._context)
+        self.name = f"observer_{secrets.token_hex(6)}"
+        self.node = Node(self.name, context=self._context, enable_rosout=False, start_parameter_services=False)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._subscribed: set[Handle] = set()
+        self._output: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
+        self._program: process.Process | None = None
+        self._splitters: dict[str, OutputLines] = {}
+        self._processes: dict[int, str] = {}
+        self._next_graph = 0.0
+        self._next_processes = 0.0
+        self._stopping = False
+
+    # --- the program ------------------------------------------------------------------------
+
+    def start(self, request: Request, label: str) -> None:
+        """Start the submission's program; *label* is the executable's name, empty for a launch."""
+        line_bytes = lab.limits().resources.line_bytes
+        self._splitters = {name: OutputLines(name, label, line_bytes) for name in ("stdout", "stderr")}
+        self._label = label
+        self.recorder.begin()
+        self._program = process.Process(request, on_output=self._on_output)
+
+    def _on_output(self, stream: str, data: bytes) -> None:
+        self._output.put((stream, data))
+        self._executor.wake()
+
+    def stop(self) -> None:
+        """Stop the program and record how it ended."""
+        self._look_at_processes()
+        self._stopping = True
+        if self._program is not None:
+            self._program.stop()
+            self._program.wait()
+        self._drain_output()
+        self._note_end()
+
+    def alive(self) -> bool:
+        """Whether the program still runs; once it has ended, all it printed has been read."""
+        if self.ended is None and self._program is not None and not self._program.running:
+            self._drain_output()
+            self._note_end()
+        return self.ended is None
+
+    def _note_end(self) -> None:
+        if self.ended is not None or self._program is None:
+            return
+        outcome = self._program.wait()
+        for splitter in self._splitters.values():
+            self._keep(splitter.rest(self.recorder.now()))
+        self._look_at_processes()
+        by = outcome.ended_by
+        self.ended = ProgramEnded(self.recorder.now(), outcome.code, outcome.signal, by, outcome.limit)
+        self.recorder.write(self.ended)
+        if outcome.dropped_bytes:
+            self.recorder.write(Measured(self.recorder.now(), "dropped_bytes", outcome.dropped_bytes))
+
+    def executables(self) -> frozenset[str]:
+        """Names of the package's executables that are running now."""
+        return frozenset(filter(None, self._processes.values()))
+
+    def _look_at_processes(self) -> None:
+        if self._program is None:
+            return
+        found = {info.pid: info for info in process.tree(self._program.pid)} if self._program.running else {}
+        marker = f"/lib/{lab.specification().package}/"
+        for pid, info in found.items():
+            if pid not in self._processes:
+                script = next((part for part in info.command[:2] if marker in part), "")
+                executable = PurePosixPath(script).name if script else ""
+                self._processes[pid] = executable
+                if executable:
+                    command = clean(" ".join(info.command), 500)
+                    self.recorder.write(ProcessSeen(self.recorder.now(), pid, clean(executable, 100), command))
+        for pid in [pid for pid in self._processes if pid not in found]:
+            if self._processes.pop(pid):
+                by = EndedBy.GRADER if self._stopping else EndedBy.ITSELF
+                self.recorder.write(ProcessGone(self.recorder.now(), pid, by))
+
+    # --- what it prints ---------------------------------------------------------------------
+
+    def _drain_output(self) -> None:
+        now = self.recorder.now()
+        while not self._output.empty():
+            stream, data = self._output.get()
+            self._keep(self._splitters[stream].take(data, now))
+
+    def finish_lines(self) -> None:
+        """Take what was printed without an end of line so far as a line."""
+        now = self.recorder.now()
+        for splitter in self._splitters.values():
+            self._keep(splitter.rest(now))
+
+    def _keep(self, lines: list[Line]) -> None:
+        for line in lines:
+            if line.text.startswith(UNSUPPORTED) and line.source == "launch":
+                self.recorder.write(Unsupported(line.at, line.text[len(UNSUPPORTED) :]))
+            self.lines.append(line)
+            self.recorder.write(line)
+
+    # --- the graph --------------------------------------------------------------------------
+
+    def nodes(self) -> frozenset[str]:
+        """Fully qualified names of the other nodes."""
+        found = self.node.get_node_names_and_namespaces()
+        return frozenset(f"{space.rstrip('/')}/{name}" for name, space in found if name != self.name)
+
+    def look_at_graph(self) -> None:
+        """Record which endpoints came and went, and subscribe to what is published as it is offered."""
+        now = self.recorder.now()
+        found: dict[str, Endpoint] = {}
+        for topic, _ in self.node.get_topic_names_and_types():
+            if topic in HOUSEKEEPING_TOPICS[:2]:
+                continue
+            publishers = self.node.get_publishers_info_by_topic(topic)
+            subscriptions = self.node.get_subscriptions_info_by_topic(topic) if topic != "/clock" else []
+            for kind, infos in (("publisher", publishers), ("subscription", subscriptions)):
+                for info in infos:
+                    if info.node_name == self.name:
+                        continue
+                    gid = bytes(info.endpoint_gid).hex()
+                    found[gid] = self.endpoints.get(gid) or self._endpoint(now, kind, gid, topic, info)
+        for gid, endpoint in found.items():
+            if gid not in self.endpoints:
+                self.recorder.write(endpoint)
+                self.graph_changed_at = now
+                if endpoint.kind == "publisher" and endpoint.topic not in HOUSEKEEPING_TOPICS:
+                    reliable, lasting = endpoint.reliability == "reliable", endpoint.durability == "transient-local"
+                    self.listen(endpoint.topic, endpoint.type, reliable, lasting)
+        for gid in self.endpoints.keys() - found.keys():
+            gone = self.endpoints[gid]
+            fields = (gone.kind, gid, gone.node, gone.topic, gone.type, gone.reliability, gone.durability)
+            self.recorder.write(Endpoint(now, "gone", *fields))
+            self.graph_changed_at = now
+        self.endpoints = found
+
+    def _endpoint(self, now: float, kind: str, gid: str, topic: str, info: Any) -> Endpoint:
+        qos = info.qos_profile
+        reliable = qos.reliability == ReliabilityPolicy.RELIABLE
+        lasting = qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        return Endpoint(
+            at=now,
+            event="appeared",
+            kind=kind,
+            gid=gid,
+            node=clean(f"{info.node_namespace.rstrip('/')}/{info.node_name}", 300),
+            topic=clean(topic, 300),
+            type=clean(info.topic_type, 200),
+            reliability="reliable" if reliable else "best-effort",
+            durability="transient-local" if lasting else "volatile",
+        )
+
+    def listen(self, topic: str, type_name: str, reliable: bool = True, lasting: bool = False) -> None:
+        """Subscribe to *topic* with that type and quality of service, once; a type that is not here is not heard."""
+        # A reliable publisher is heard by the same subscription whether or not it keeps old messages for late comers.
+        handle = (topic, type_name, reliable, False if reliable else lasting)
+        message_type = message_class(type_name)
+        if handle in self._subscribed or message_type is None:
+            return
+        self._subscribed.add(handle)
+        qos = QoSProfile(
+            depth=QUEUE_DEPTH,
+            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.VOLATILE,
+        )
+
+        def heard(message: Any, info: Any) -> None:
+            data = getattr(message, "data", None)
+            kept = clean(data, 1000) if isinstance(data, str) else data if isinstance(data, int | float) else None
+            number = int(info["publication_sequence_number"] or 0)
+            row = Message(self.recorder.now(), topic, type_name, number, kept)
+            self.messages.append(row)
+            self.recorder.write(row)
+
+        self.node.create_subscription(message_type, topic, heard, qos)
+
+    def publisher(self, topic: str, type_name: str) -> Publisher[Any]:
+        """A publisher of the observer's own, with the default quality of service."""
+        message_type = message_class(type_name)
+        assert message_type is not None, type_name
+        return self.node.create_publisher(message_type, topic, 10)
+
+    # --- waiting ----------------------------------------------------------------------------
+
+    def spin(self, seconds: float) -> None:
+        """Let at most one thing happen, waiting no longer than *seconds*; look around when it is time to."""
+        self._executor.spin_once(timeout_sec=seconds)
+        self._drain_output()
+        now = time.monotonic()
+        if now >= self._next_graph:
+            self.look_at_graph()
+            self._next_graph = now + GRAPH_POLL_SECONDS * (1 if not self.messages else 10)
+        if now >= self._next_processes:
+            self._look_at_processes()
+            self.recorder.flush()
+            self._next_processes = now + PROCESS_POLL_SECONDS
+
+    def until(self, condition: Callable[[], bool], seconds: float) -> bool:
+        """Wait until *condition* holds, for at most *seconds*; whether it does."""
+        deadline = time.monotonic() + seconds
+        while not condition():
+            left = deadline - time.monotonic()
+            if left <= 0:
+                return False
+            self.spin(min(left, GRAPH_POLL_SECONDS))
+        return True
+
+
+def message_class(type_name: str) -> Any | None:
+    """The class of a message type such as `std_msgs/msg/Int8`; None when it is not installed here."""
+    match = TYPE_NAME.match(type_name)
+    if match is None:
+        return None
+    try:
+        return getattr(importlib.import_module(f"{match[1]}.msg"), match[2], None)
+    except ImportError:
+        return None

@@ -1,0 +1,155 @@
+"""Wraps a request in bubblewrap, so that what it runs sees little and reaches nothing.
+
+Two walls, one inside the other (DESIGN section 6). `private_network` gives the grader's own observer a network with
+nothing but a loopback. `confine` puts a submission's processes into namespaces of their own, with a read-only system,
+private scratch space, and none of the grader's files but those that ROS needs. Without bubblewrap both return the
+request as it is, and `protections_off` says what that leaves open.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import msgspec
+
+from lab2_grader import lab, process
+from lab2_grader.records import Limits, Record, Request
+
+HOME = "/home/student"
+WORKSPACE = "/ws"
+
+SYSTEM_FILES = (
+    "/etc/alternatives",
+    "/etc/ld.so.cache",
+    "/etc/ld.so.conf",
+    "/etc/ld.so.conf.d",
+    "/etc/localtime",
+    "/etc/nsswitch.conf",
+    "/etc/passwd",
+    "/etc/group",
+)
+
+
+class Isolation(Record):
+    """Whether submissions are isolated; `reason` says why not, `mend` which command changes that."""
+
+    on: bool
+    reason: str = ""
+    mend: str = ""
+
+    @property
+    def name(self) -> str:
+        """As `result.json` names it."""
+        return "bubblewrap" if self.on else "off"
+
+
+class Mount(Record):
+    """A host path shown read-only inside; `inside` is empty when it is shown under its own name."""
+
+    host: str
+    inside: str = ""
+
+
+@functools.cache
+def probe() -> Isolation:
+    """Whether bubblewrap is here and the kernel lets it do what both walls need; tried, not guessed."""
+    if shutil.which("bwrap") is None:
+        return Isolation(False, "bubblewrap is not installed", "sudo apt-get install bubblewrap")
+    nested = Request(("true",), process.environment("PATH"), "/", Limits(seconds=10))
+    outcome = process.run(private_network(confine(nested, (), Isolation(True)), Isolation(True)))
+    if outcome.code == 0:
+        return Isolation(True)
+    said = outcome.stderr.decode(errors="replace").strip().splitlines()
+    return Isolation(
+        False,
+        f"bubblewrap does not work here ({said[-1] if said else f'exit code {outcome.code}'})",
+        "sudo sysctl -w kernel.apparmor_restrict_unprivileged_userns=0",
+    )
+
+
+def private_network(request: Request, isolation: Isolation) -> Request:
+    """The outer wall: *request* sees the whole system read-only and a network of its own with only a loopback."""
+    if not isolation.on:
+        return request
+    argv = (
+        *("bwrap", "--die-with-parent", "--new-session", "--unshare-net", "--unshare-ipc"),
+        # The machine's own /proc, writable: the kernel lets the inner wall mount a /proc only where this one is
+        # untouched, and the inner wall's user map is written through it. Only the observer runs here.
+        *("--ro-bind", "/", "/", "--bind", "/proc", "/proc", "--dev", "/dev"),
+        *("--chdir", request.cwd, "--", *request.argv),
+    )
+    return msgspec.structs.replace(request, argv=argv, cwd="/")
+
+
+def confine(
+    request: Request,
+    mounts: tuple[Mount, ...],
+    isolation: Isolation,
+    network: bool = True,
+    workspace_bytes: int = 0,
+) -> Request:
+    """The inner wall: *request* sees the system's programs, *mounts* and private scratch space, and nothing else.
+
+    Args:
+        request: What the submission runs; its `cwd` must exist inside.
+        mounts: What it may read besides the system.
+        isolation: Whether walls can be had.
+        network: Whether it shares the network of whoever starts it (the observer's private one).
+        workspace_bytes: Size of a writable `WORKSPACE` of its own; 0 for none.
+    """
+    if not isolation.on:
+        return request
+    scratch = str(lab.limits().resources.scratch_bytes)
+    argv = [
+        *("bwrap", "--die-with-parent", "--new-session", "--unshare-user", "--unshare-pid", "--unshare-ipc"),
+        *("--unshare-uts", "--unshare-cgroup-try", "--hostname", "lab2", "--cap-drop", "ALL"),
+        *("--ro-bind", "/usr", "/usr", "--proc", "/proc", "--dev", "/dev"),
+        *("--size", scratch, "--tmpfs", "/dev/shm", "--size", scratch, "--tmpfs", "/tmp"),
+        *("--size", scratch, "--tmpfs", HOME),
+    ]
+    if not network:
+        argv.append("--unshare-net")
+    if workspace_bytes:
+        argv += ["--size", str(workspace_bytes), "--tmpfs", WORKSPACE]
+    for name in ("/bin", "/sbin", "/lib", "/lib32", "/lib64"):
+        if os.path.islink(name):
+            argv += ["--symlink", os.readlink(name), name]
+        elif os.path.isdir(name):
+            argv += ["--ro-bind", name, name]
+    for name in SYSTEM_FILES:
+        argv += ["--ro-bind-try", name, name]
+    for mount in (*interpreter_mounts(), *mounts):
+        argv += ["--ro-bind", mount.host, mount.inside or mount.host]
+    for hidden in own_files():
+        argv += ["--tmpfs", hidden]
+    argv += ["--remount-ro", "/", "--chdir", request.cwd, "--", *request.argv]
+    return msgspec.structs.replace(request, argv=tuple(argv), cwd="/")
+
+
+@functools.cache
+def interpreter_mounts() -> tuple[Mount, ...]:
+    """The running Python, when it stands outside /usr (a virtual environment, pyenv)."""
+    prefixes = {sys.prefix, sys.base_prefix, os.path.realpath(sys.base_prefix)}
+    return tuple(Mount(prefix) for prefix in sorted(prefixes) if not Path(prefix).is_relative_to("/usr"))
+
+
+@functools.cache
+def own_files() -> tuple[str, ...]:
+    """The grader's own package, where it is installed inside a prefix that submissions are shown."""
+    package = Path(__file__).parent
+    shown = any(package.is_relative_to(mount.host) for mount in interpreter_mounts())
+    return (str(package),) if shown or package.is_relative_to("/usr") else ()
+
+
+def protections_off(isolation: Isolation) -> str:
+    """What is not protected without the walls, as a sentence; empty when they stand."""
+    if isolation.on:
+        return ""
+    return (
+        f"Isolation is off: {isolation.reason}. The submission ran with your rights: it could read your files, "
+        "use your network and change this result. Grade only your own code like this."
+    )

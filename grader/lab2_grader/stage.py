@@ -1,0 +1,257 @@
+"""Plays the scenes of one submission: which, with what, side by side, each observed by a process of its own.
+
+Observers take longer to start than to observe, so they are started while the submission is still being built and wait
+for their plan. What they say goes to the evidence file as it comes.
+"""
+
+from __future__ import annotations
+
+import random
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+
+import msgspec
+
+from lab2_grader import lab, process, sandbox
+from lab2_grader.evidence import SceneEntry, Writer, events
+from lab2_grader.records import (
+    Build,
+    Clock,
+    EndedBy,
+    Endpoint,
+    Limits,
+    Message,
+    ProcessSeen,
+    Request,
+    Scene,
+    SceneName,
+    ScenePlan,
+)
+from lab2_grader.ros import Ros
+
+INSTALLED = f"{sandbox.WORKSPACE}/install"
+OBSERVER_OUTPUT_BYTES = 40_000_000
+OBSERVER_GRACE_SECONDS = 30.0
+WORDS = ("amber", "birch", "cobalt", "delta", "ember", "fjord", "garnet", "heron", "indigo", "juniper", "kestrel", "lilac")
+
+# Runs a module's main without its entry point: for a package whose setup.py does not name it.
+RUN_MODULE = (
+    "import importlib, runpy, sys\n"
+    "name = sys.argv.pop(1)\n"
+    "main = getattr(importlib.import_module(name), 'main', None)\n"
+    "sys.exit(main() if main else runpy.run_module(name, run_name='__main__') and None)\n"
+)
+
+
+class _Observer:
+    """An observer's process: started early, told its plan later."""
+
+    def __init__(self, ros: Ros, isolation: sandbox.Isolation, home: Path) -> None:
+        self._sink: Callable[[bytes], object] | None = None
+        self._early: list[bytes] = []
+        self._errors = bytearray()
+        environment = dict(ros.environment(str(home)))
+        here = str(Path(__file__).parent.parent)
+        environment["PYTHONPATH"] = ":".join(filter(None, (here, environment.get("PYTHONPATH", ""))))
+        conversation = lab.limits().conversation
+        seconds = conversation.realtime_seconds + conversation.timelapse_seconds + OBSERVER_GRACE_SECONDS
+        request = Request(
+            argv=(sys.executable, "-P", "-m", "lab2_grader.observe"),
+            env=tuple(environment.items()),
+            cwd="/",
+            limits=Limits(seconds=seconds, output_bytes=OBSERVER_OUTPUT_BYTES),
+        )
+        self._process = process.Process(sandbox.private_network(request, isolation), self._on_output, keep_stdin=True)
+
+    def _on_output(self, stream: str, data: bytes) -> None:
+        if stream == "stderr":
+            self._errors += data[: max(0, 20_000 - len(self._errors))]
+        elif self._sink is not None:
+            self._sink(data)
+
+    def play(self, plan: ScenePlan, started_with: str, path: Path) -> Scene:
+        """Play *plan*, writing what is observed to *path*, and return it."""
+        began = time.monotonic()
+        with path.open("wb", buffering=0) as file:
+            self._sink = file.write
+            self._process.send(msgspec.json.encode(plan) + b"\n")
+            outcome = self._process.wait()
+        complete = outcome.code == 0 and not outcome.dropped_bytes
+        fault = ""
+        if not complete:
+            said = self._errors.decode(errors="replace").strip().splitlines()
+            last = said[-1] if said else f"exit code {outcome.code}, signal {outcome.signal}"
+            fault = f"The observer of the scene '{plan.scene.value}' did not come to its end ({last})."
+        seconds = round(time.monotonic() - began, 2)
+        return Scene(plan.scene, started_with, plan.clock, complete, fault, seconds, events(path.read_bytes()))
+
+    def dismiss(self) -> None:
+        """End an observer; one that has played its scene does not mind."""
+        self._process.stop(EndedBy.GRADER)
+        self._process.wait()
+
+
+class Stage:
+    """The scenes of one submission.
+
+    Args:
+        ros: With which ROS.
+        isolation: Whether there are walls.
+        writer: Where evidence goes.
+        home: A private directory for the observers.
+        clock: How the numeric pair is to be driven.
+        seed: Of the numbers that are made up; None for the machine's own randomness.
+    """
+
+    def __init__(
+        self,
+        ros: Ros,
+        isolation: sandbox.Isolation,
+        writer: Writer,
+        home: Path,
+        clock: Clock,
+        seed: int | None = None,
+    ) -> None:
+        self._ros = ros
+        self._isolation = isolation
+        self._writer = writer
+        self._home = home
+        self._clock = clock
+        self._random = random.Random(seed)
+        self._waiting = [self._observer() for _ in range(3)]
+
+    def _observer(self) -> _Observer:
+        return _Observer(self._ros, self._isolation, self._home)
+
+    def close(self) -> None:
+        """Dismiss the observers that were not needed."""
+        while self._waiting:
+            self._waiting.pop().dismiss()
+
+    def play(self, build: Build, installed: Path) -> tuple[Scene, ...]:
+        """Play every scene that this build allows, side by side.
+
+        Args:
+            build: What was built.
+            installed: Where it was unpacked: the folder that holds `install/`.
+
+        Raises:
+            FaultError: An observer could not be started.
+        """
+        specification = lab.specification()
+        numeric, original = specification.numeric, specification.original
+        jobs: list[Callable[[], tuple[Scene, ...]]] = []
+        if self._single(numeric.listener, build, installed) is not None:
+            observer = self._waiting.pop()
+            jobs.append(lambda: (self._listener(observer, build, installed),))
+        if _launch_path(build, original.launch_file):
+            second = self._waiting.pop()
+            jobs.append(lambda: (self._launched(SceneName.ORIGINALS, second, build, installed, original.launch_file),))
+        jobs.insert(0, lambda: self._conversation_and_talker(build, installed))
+        with ThreadPoolExecutor(max_workers=len(jobs)) as pool:
+            futures: list[Future[tuple[Scene, ...]]] = [pool.submit(job) for job in jobs]
+            scenes = [scene for future in futures for scene in future.result()]
+        order = list(SceneName)
+        return tuple(sorted(scenes, key=lambda scene: order.index(scene.name)))
+
+    # --- one scene each ---------------------------------------------------------------------
+
+    def _conversation_and_talker(self, build: Build, installed: Path) -> tuple[Scene, ...]:
+        scenes: tuple[Scene, ...] = ()
+        numeric = lab.specification().numeric
+        if _launch_path(build, numeric.launch_file):
+            observer = self._waiting.pop(0) if self._waiting else self._observer()
+            scenes = (self._launched(SceneName.CONVERSATION, observer, build, installed, numeric.launch_file),)
+            if _shows_talker(scenes[0]):
+                return scenes
+        single = self._single(numeric.talker, build, installed, follow=self._clock is Clock.TIME_LAPSE)
+        if single is None:
+            return scenes
+        how, request = single
+        plan = ScenePlan(SceneName.TALKER, self._clock, request, numeric.talker)
+        observer = self._waiting.pop(0) if self._waiting else self._observer()
+        return (*scenes, observer.play(plan, how, self._writer.scene_path(plan.scene)))
+
+    def _launched(self, name: SceneName, observer: _Observer, build: Build, installed: Path, launch_file: str) -> Scene:
+        clock = self._clock if name is SceneName.CONVERSATION else Clock.REAL_TIME
+        package = lab.specification().package
+        path = f"{self._prefix(installed)}/share/{package}/{_launch_path(build, launch_file)}"
+        argv = self._ros.launch_argv(package, launch_file, path, clock is Clock.TIME_LAPSE)
+        plan = ScenePlan(name, clock, self._confined(argv, installed), "")
+        return observer.play(plan, "launch", self._writer.scene_path(name))
+
+    def _listener(self, observer: _Observer, build: Build, installed: Path) -> Scene:
+        listener, limits = lab.specification().numeric.listener, lab.limits().listener
+        single = self._single(listener, build, installed)
+        assert single is not None
+        how, request = single
+        numbers = self._random.sample(range(-128, 128), limits.numbers + 1)
+        texts = [" ".join(self._random.sample(WORDS, 3)) for _ in range(limits.texts + 1)]
+        plan = ScenePlan(SceneName.LISTENER, Clock.REAL_TIME, request, listener, tuple(numbers), tuple(texts))
+        return observer.play(plan, how, self._writer.scene_path(plan.scene))
+
+    # --- what is started --------------------------------------------------------------------
+
+    def _prefix(self, installed: Path) -> str:
+        root = INSTALLED if self._isolation.on else str(installed / "install")
+        return f"{root}/{lab.specification().package}"
+
+    def _single(
+        self, name: str, build: Build, installed: Path, follow: bool = False
+    ) -> tuple[str, Request] | None:
+        """How to start *name* by itself: its executable, failing that the module of that name; None when neither is."""
+        package = lab.specification().package
+        ros_arguments = ("--ros-args", "-p", "use_sim_time:=true") if follow else ()
+        if name in build.executables:
+            program = f"{self._prefix(installed)}/lib/{package}/{name}"
+            return "executable", self._confined((program, *ros_arguments), installed)
+        if name in build.modules:
+            argv = (sys.executable, "-c", RUN_MODULE, f"{package}.{name}", *ros_arguments)
+            return "module", self._confined(argv, installed)
+        return None
+
+    def _confined(self, argv: tuple[str, ...], installed: Path) -> Request:
+        home = sandbox.HOME if self._isolation.on else str(self._home)
+        conversation, resources = lab.limits().conversation, lab.limits().resources
+        seconds = conversation.realtime_seconds + conversation.timelapse_seconds
+        request = Request(
+            argv=argv, env=self._ros.environment(home, self._prefix(installed)), cwd=home, limits=resources.limits(seconds)
+        )
+        mounts = (
+            sandbox.Mount(str(installed / "install"), INSTALLED),
+            *(sandbox.Mount(path) for path in self._ros.reads()),
+        )
+        return sandbox.confine(request, mounts, self._isolation)
+
+
+def entry(scene: Scene) -> SceneEntry:
+    """What the manifest says of *scene*."""
+    return SceneEntry(scene.name, scene.started_with, scene.clock, scene.complete, scene.fault, scene.seconds)
+
+
+def _launch_path(build: Build, name: str) -> str:
+    """Where the launch file *name* was installed below the package's share directory; empty when it was not.
+
+    Like `ros2 launch`, which looks through the whole share directory; of several the first is taken here, and the
+    launch itself then says that it is ambiguous.
+    """
+    return next((path for path in build.launch_files if path.rsplit("/", 1)[-1] == name), "")
+
+
+def _shows_talker(scene: Scene) -> bool:
+    """Whether the launch let the talker be judged: it ran, spoke, and nobody else spoke on its topic."""
+    talker = lab.specification().numeric.talker
+    topic = lab.specification().number_topic.name
+    started = any(isinstance(event, ProcessSeen) and event.executable == talker for event in scene.events)
+    speakers = {
+        event.gid
+        for event in scene.events
+        if isinstance(event, Endpoint) and event.kind == "publisher" and event.topic == topic
+    }
+    heard = any(isinstance(event, Message) and event.topic == topic for event in scene.events)
+    return started and heard and len(speakers) == 1
+
+
