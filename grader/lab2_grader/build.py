@@ -73,6 +73,7 @@ def build(submission: Submission, into: Path, ros: Ros, isolation: sandbox.Isola
         entry_points=_entry_points(prefix) if ok else (),
         modules=_modules(prefix, package) if ok else (),
         launch_files=_launch_files(prefix / "share" / package) if ok else (),
+        dangling=_dangling(prefix, package) if ok else (),
     )
 
 
@@ -114,6 +115,17 @@ def _entry_points(prefix: Path) -> tuple[EntryPoint, ...]:
 def _modules(prefix: Path, package: str) -> tuple[str, ...]:
     folder = _site_packages(prefix) / package
     return tuple(sorted(clean(path.stem, 100) for path in folder.glob("*.py")))
+
+
+def _dangling(prefix: Path, package: str) -> tuple[str, ...]:
+    """Executables whose entry point names a module below the package that is not there."""
+    found = []
+    for point in _entry_points(prefix):
+        module = point.target.split(":")[0].strip()
+        path = _site_packages(prefix).joinpath(*module.split("."))
+        if module.split(".")[0] == package and not (path.is_dir() or path.with_suffix(".py").is_file()):
+            found.append(point.name)
+    return tuple(sorted(found))
 
 
 def _launch_files(share: Path) -> tuple[str, ...]:

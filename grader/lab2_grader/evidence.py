@@ -45,6 +45,7 @@ class SceneEntry(Record):
 
     name: SceneName
     started_with: str
+    label: str
     clock: Clock
     complete: bool
     fault: str
@@ -168,7 +169,16 @@ def _scene(folder: Path, entry: SceneEntry) -> Scene:
         raise UsageError(f"{path} is damaged: {error}. Grade the submission again.") from error
     if entry.complete and not raw.endswith(b"\n"):
         raise UsageError(f"{path} is cut short. Grade the submission again.")
-    return Scene(entry.name, entry.started_with, entry.clock, entry.complete, entry.fault, entry.seconds, found)
+    return Scene(
+        entry.name,
+        entry.started_with,
+        entry.label,
+        entry.clock,
+        entry.complete,
+        entry.fault,
+        entry.seconds,
+        found,
+    )
 
 
 def _bytes(path: Path) -> bytes:

@@ -184,6 +184,7 @@ class Build(Record):
         entry_points: The console scripts that were installed.
         modules: Python modules of the package that were installed, without the package's name, sorted.
         launch_files: Files below `share/lab2` that end in `.py`, `.xml`, `.yaml` or `.yml`, sorted.
+        dangling: Executables whose entry point names a module of the package that was not installed, sorted.
     """
 
     ok: bool
@@ -196,6 +197,7 @@ class Build(Record):
     entry_points: tuple[EntryPoint, ...]
     modules: tuple[str, ...]
     launch_files: tuple[str, ...]
+    dangling: tuple[str, ...]
 
 
 # --- scenes: what an observer saw ---------------------------------------------------------------
@@ -379,7 +381,8 @@ class Scene(Record):
 
     Args:
         name: Which scene.
-        started_with: `launch`, `executable` or `module`: how the submission's nodes were started.
+        started_with: How the submission's nodes were started: `launch`, or the `executable` or `module` of a name.
+        label: Name of that executable or module; empty for a launch.
         clock: Who was to drive the ROS clock.
         complete: The observer came to the end of its plan.
         fault: What of ours failed, in a sentence; empty when nothing did.
@@ -389,6 +392,7 @@ class Scene(Record):
 
     name: SceneName
     started_with: str
+    label: str
     clock: Clock
     complete: bool
     fault: str
@@ -469,7 +473,8 @@ class Verdict(Record):
     Args:
         check: Its id.
         status: What became of it.
-        message: Key of the message in the catalogue, for example `talker-wrap.overflow`; empty on a pass.
+        message: Key of the fault in the catalogue, for example `overflow`; empty on a pass.
+        symptom: Id of the worksheet's troubleshooting row that fits; empty for none.
         expected: What the worksheet asks, for people.
         observed: What was seen, for people.
         hint: What to try next, for people; empty on a pass.
@@ -484,6 +489,7 @@ class Verdict(Record):
     expected: str = ""
     observed: str = ""
     hint: str = ""
+    symptom: str = ""
     because: tuple[str, ...] = ()
     file: str = ""
     line: int = 0
@@ -503,6 +509,7 @@ class CheckResult(Record):
     hint: str
     section: str
     message: str
+    symptom: str
     because: tuple[str, ...]
     file: str
     line: int

@@ -17,6 +17,7 @@ import msgspec
 
 from lab2_grader import lab, process, sandbox
 from lab2_grader.evidence import SceneEntry, Writer, events
+from lab2_grader.near import nearest
 from lab2_grader.records import (
     Build,
     Clock,
@@ -86,7 +87,8 @@ class _Observer:
             last = said[-1] if said else f"exit code {outcome.code}, signal {outcome.signal}"
             fault = f"The observer of the scene '{plan.scene.value}' did not come to its end ({last})."
         seconds = round(time.monotonic() - began, 2)
-        return Scene(plan.scene, started_with, plan.clock, complete, fault, seconds, events(path.read_bytes()))
+        found = events(path.read_bytes())
+        return Scene(plan.scene, started_with, plan.label, plan.clock, complete, fault, seconds, found)
 
     def dismiss(self) -> None:
         """End an observer; one that has played its scene does not mind."""
@@ -170,8 +172,8 @@ class Stage:
         single = self._single(numeric.talker, build, installed, follow=self._clock is Clock.TIME_LAPSE)
         if single is None:
             return scenes
-        how, request = single
-        plan = ScenePlan(SceneName.TALKER, self._clock, request, numeric.talker)
+        how, label, request = single
+        plan = ScenePlan(SceneName.TALKER, self._clock, request, label)
         observer = self._waiting.pop(0) if self._waiting else self._observer()
         return (*scenes, observer.play(plan, how, self._writer.scene_path(plan.scene)))
 
@@ -187,10 +189,10 @@ class Stage:
         listener, limits = lab.specification().numeric.listener, lab.limits().listener
         single = self._single(listener, build, installed)
         assert single is not None
-        how, request = single
+        how, label, request = single
         numbers = self._random.sample(range(-128, 128), limits.numbers + 1)
         texts = [" ".join(self._random.sample(WORDS, 3)) for _ in range(limits.texts + 1)]
-        plan = ScenePlan(SceneName.LISTENER, Clock.REAL_TIME, request, listener, tuple(numbers), tuple(texts))
+        plan = ScenePlan(SceneName.LISTENER, Clock.REAL_TIME, request, label, tuple(numbers), tuple(texts))
         return observer.play(plan, how, self._writer.scene_path(plan.scene))
 
     # --- what is started --------------------------------------------------------------------
@@ -201,16 +203,30 @@ class Stage:
 
     def _single(
         self, name: str, build: Build, installed: Path, follow: bool = False
-    ) -> tuple[str, Request] | None:
-        """How to start *name* by itself: its executable, failing that the module of that name; None when neither is."""
-        package = lab.specification().package
+    ) -> tuple[str, str, Request] | None:
+        """How to start *name* by itself: (`executable` or `module`, its name, the request); None when there is nothing.
+
+        Failing the executable the module of that name, failing that the one whose name comes nearest: a missing entry
+        point or a misspelt file costs its own marks and no others.
+        """
+        package, specification = lab.specification().package, lab.specification()
         ros_arguments = ("--ros-args", "-p", "use_sim_time:=true") if follow else ()
-        if name in build.executables:
-            program = f"{self._prefix(installed)}/lib/{package}/{name}"
-            return "executable", self._confined((program, *ros_arguments), installed)
-        if name in build.modules:
-            argv = (sys.executable, "-c", RUN_MODULE, f"{package}.{name}", *ros_arguments)
-            return "module", self._confined(argv, installed)
+        pairs = (specification.original, specification.numeric)
+        taken = {program for pair in pairs for program in (pair.talker, pair.listener)}
+        executables = [found for found in build.executables if found not in build.dangling]
+        candidates = (
+            ("executable", name if name in executables else ""),
+            ("module", name if name in build.modules else ""),
+            ("executable", nearest(name, executables, taken)),
+            ("module", nearest(name, build.modules, taken)),
+        )
+        how, found = next((candidate for candidate in candidates if candidate[1]), ("", ""))
+        if how == "executable":
+            program = f"{self._prefix(installed)}/lib/{package}/{found}"
+            return how, found, self._confined((program, *ros_arguments), installed)
+        if how == "module":
+            argv = (sys.executable, "-c", RUN_MODULE, f"{package}.{found}", *ros_arguments)
+            return how, found, self._confined(argv, installed)
         return None
 
     def _confined(self, argv: tuple[str, ...], installed: Path) -> Request:
@@ -229,7 +245,9 @@ class Stage:
 
 def entry(scene: Scene) -> SceneEntry:
     """What the manifest says of *scene*."""
-    return SceneEntry(scene.name, scene.started_with, scene.clock, scene.complete, scene.fault, scene.seconds)
+    return SceneEntry(
+        scene.name, scene.started_with, scene.label, scene.clock, scene.complete, scene.fault, scene.seconds
+    )
 
 
 def _launch_path(build: Build, name: str) -> str:
@@ -242,16 +260,16 @@ def _launch_path(build: Build, name: str) -> str:
 
 
 def _shows_talker(scene: Scene) -> bool:
-    """Whether the launch let the talker be judged: it ran, spoke, and nobody else spoke on its topic."""
-    talker = lab.specification().numeric.talker
-    topic = lab.specification().number_topic.name
+    """Whether the launch let the talker be judged: it ran, spoke, and nobody else spoke on either topic."""
+    specification = lab.specification()
+    topics = (specification.number_topic.name, specification.text_topic.name)
+    talker = specification.numeric.talker
     started = any(isinstance(event, ProcessSeen) and event.executable == talker for event in scene.events)
-    speakers = {
-        event.gid
+    speakers = [
+        (event.node, event.topic)
         for event in scene.events
-        if isinstance(event, Endpoint) and event.kind == "publisher" and event.topic == topic
-    }
-    heard = any(isinstance(event, Message) and event.topic == topic for event in scene.events)
-    return started and heard and len(speakers) == 1
-
-
+        if isinstance(event, Endpoint) and event.event == "appeared" and event.kind == "publisher"
+        and event.topic in topics
+    ]
+    heard = any(isinstance(event, Message) and event.topic == topics[0] for event in scene.events)
+    return started and heard and len({node for node, _ in speakers}) == 1 and len(speakers) <= len(topics)

@@ -44,8 +44,8 @@ def _start(observer: Observer, plan: ScenePlan, wanted: frozenset[tuple[str, str
         wanted: (kind, topic) of the endpoints that a complete graph has.
     """
     limits = lab.limits().start
-    _phase(observer, "start")
     observer.start(plan.program, plan.label)
+    _phase(observer, "start")
     began = time.monotonic()
 
     def complete() -> bool:

@@ -1,0 +1,162 @@
+"""What the launch file starts, and whether the launched pair talks (worksheet 6.7.3 and 6.7.5)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
+from lab2_grader.checks.view import SceneView, View, names
+from lab2_grader.near import nearest
+from lab2_grader.reading import numbers_in
+from lab2_grader.records import Message, SceneName, Status, Verdict
+
+Earlier = Mapping[str, Verdict]
+
+CAUGHT = re.compile(r"Caught (?:multiple exceptions?|exception) .*?: ?(.*)$")
+NO_EXECUTABLE = re.compile(r"executable '([^']*)' not found on the libexec directory")
+NO_PACKAGE = re.compile(r"""[Pp]ackage ['"][^'"]*['"] not found""")
+ENOUGH_ANSWERS = 8  # of the slow dozen; the first few may be lost while the pair still discovers each other
+
+
+def launch_starts(view: View, earlier: Earlier) -> Verdict:
+    """`ros2 launch lab2 numeric_chatter.py` starts `numeric_talker` and `numeric_listener`."""
+    check, scene = "launch-starts", view.scene(SceneName.CONVERSATION)
+    if scene is None:
+        return _no_launch_file(view)
+    if fault := _our_fault(check, scene):
+        return fault
+    numeric = view.specification.numeric
+    started = scene.started()
+    missing = [name for name in (numeric.talker, numeric.listener) if name not in started]
+    if not missing:
+        return passed(check)
+    error = launch_error(scene)
+    build = view.build
+    assert build is not None
+    if asked := NO_EXECUTABLE.search(error):
+        if asked[1] in (numeric.talker, numeric.listener):
+            return blocked(check, "entry-points")
+        return failed(check, "no-executable", asked=asked[1], found=names(build.executables))
+    if any(name not in build.executables for name in missing) and earlier["entry-points"].status is Status.FAIL:
+        return blocked(check, "entry-points")
+    if NO_PACKAGE.search(error):
+        return failed(check, "wrong-package", error=error)
+    if error:
+        return failed(check, "raised", error=error)
+    if not started:
+        return failed(check, "nothing")
+    return failed(check, "others", started=names(started), missing=names(missing))
+
+
+def _no_launch_file(view: View) -> Verdict:
+    check, wanted = "launch-starts", view.specification.numeric.launch_file
+    build = view.build
+    assert build is not None
+    sources = [file.path for file in view.evidence.submission.sources]
+    if where := next((path for path in sources if path.rsplit("/", 1)[-1] == wanted), ""):
+        return failed(check, "not-installed", where=where)
+    installed = [path.rsplit("/", 1)[-1] for path in build.launch_files]
+    stem = wanted.removesuffix(".py")
+    candidates = {name.split(".")[0].removesuffix("_launch"): name for name in installed}
+    taken = (view.specification.original.launch_file.removesuffix(".py"),)
+    near = candidates.get(stem) or candidates.get(nearest(stem, candidates, taken), "")
+    return failed(check, "near", near=near) if near else failed(check, "missing")
+
+
+def launch_only_numeric(view: View, earlier: Earlier) -> Verdict:
+    """The launch file starts nothing but the numeric pair."""
+    check, scene = "launch-only-numeric", view.scene(SceneName.CONVERSATION)
+    if scene is None:
+        return blocked(check, "launch-starts")
+    if fault := _our_fault(check, scene):
+        return fault
+    numeric = (view.specification.numeric.talker, view.specification.numeric.listener)
+    started = scene.started()
+    others = [name for name in started if name not in numeric]
+    if others:
+        return failed(check, "others", others=names(others))
+    if not started or launch_error(scene):
+        return blocked(check, "launch-starts")
+    # Two of one in the place of the other is one fault, and launch-starts has it.
+    if twice := [name for name in numeric if started.get(name, 0) > 1 and not _respawned(scene, name)]:
+        if all(name in started for name in numeric):
+            return failed(check, "twice", others=names(twice))
+    return passed(check)
+
+
+def launch_conversation(view: View, earlier: Earlier) -> Verdict:
+    """In the launched pair, what the talker says comes out of the listener."""
+    check, scene = "launch-conversation", view.scene(SceneName.CONVERSATION)
+    starts = earlier["launch-starts"]
+    if starts.status is Status.INCONCLUSIVE and scene is not None and (fault := _our_fault(check, scene)):
+        return fault
+    if starts.status is Status.BLOCKED:
+        return blocked(check, *starts.because)
+    if scene is None or starts.status is not Status.PASS:
+        return blocked(check, "launch-starts")
+    spoken = _spoken(view, scene)
+    answered = [message for message in spoken if _answered(message, view, scene)]
+    listener = earlier["listener-numeric"]
+    received_but_not_printed = ("silent", "some", "noise", "died-on-number")
+    if _is_conversation(spoken, answered) and listener.message not in received_but_not_printed:
+        return passed(check)
+    for cause in ("talker-type", "talker-start", "listener-numeric"):
+        silent_start = cause != "talker-start" or earlier[cause].message in ("silent", "not-numbers")
+        if earlier[cause].status is not Status.PASS and silent_start:
+            return blocked(check, cause)
+    if not spoken:
+        return failed(check, "nothing")
+    shown = ", ".join(str(message.data) for message in spoken[:5]) + (" …" if len(spoken) > 5 else "")
+    return failed(check, "silent", shown=shown, printed=len(answered) or "none", count=len(spoken))
+
+
+def _spoken(view: View, scene: SceneView) -> list[Message]:
+    """The numbers of the slow dozen; without one (the talker stopped before), all there were."""
+    slow, fast = scene.phases.get("slow", 0.0), scene.phases.get("fast", float("inf"))
+    topic = view.specification.number_topic.name
+    numbers = [message for message in scene.messages if message.topic == topic and isinstance(message.data, int)]
+    return [message for message in numbers if slow <= message.at < fast] or numbers[:12]
+
+
+def _answered(message: Message, view: View, scene: SceneView) -> bool:
+    """Whether the listener printed that number after it was published, other than as part of a greeting."""
+    texts = [str(other.data) for other in scene.messages if other.topic == view.specification.text_topic.name]
+    near = [text for text in texts if str(message.data) in text]
+    listener = view.specification.numeric.listener
+    return any(
+        message.data in numbers_in(line.text, near)
+        for line in scene.lines
+        if line.source == listener and line.at >= message.at - 0.05
+    )
+
+
+def _is_conversation(spoken: list[Message], answered: list[Message]) -> bool:
+    """All that was said was answered, except for what was said before the first answer."""
+    if not answered or len(answered) < min(ENOUGH_ANSWERS, len(spoken)):
+        return False
+    return answered == spoken[spoken.index(answered[0]) :]
+
+
+def _our_fault(check: str, scene: SceneView) -> Verdict | None:
+    if scene.unsupported:
+        return inconclusive(check, "inconclusive-unsupported", what=scene.unsupported[0].what)
+    if scene.scene.fault:
+        return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
+    return None
+
+
+def launch_error(scene: SceneView) -> str:
+    """What the launch says went wrong with the launch file; empty when nothing did."""
+    own = [line.text for line in scene.lines if line.source == "launch"]
+    for index, text in enumerate(own):
+        if match := CAUGHT.search(text):
+            return match[1] or next(iter(own[index + 1 :]), text)
+    if scene.ended is not None and scene.ended.code not in (0, None):
+        return scene.error_of("launch")
+    return ""
+
+
+def _respawned(scene: SceneView, name: str) -> bool:
+    """Whether the launcher started *name* again after it had ended, as `respawn` asks for."""
+    return scene.ended_by_itself(name)

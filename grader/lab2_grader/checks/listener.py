@@ -1,0 +1,123 @@
+"""What the numeric listener prints when it runs alone (worksheet 6.7.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
+from lab2_grader.checks.view import SceneView, View, names
+from lab2_grader.near import nearest
+from lab2_grader.reading import numbers_in, said
+from lab2_grader.records import Endpoint, SceneName, Sent, Verdict
+
+Earlier = Mapping[str, Verdict]
+
+NOISE = 64  # so many different numbers that were never sent: whatever is sent would stand among them
+
+
+def listener_numeric(view: View, earlier: Earlier) -> Verdict:
+    """It prints each number that it receives on `/numeric_chatter`."""
+    check = "listener-numeric"
+    scene = view.scene(SceneName.LISTENER)
+    if scene is None:
+        return failed(check, "missing")
+    if scene.scene.fault:
+        return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
+    topic = view.specification.number_topic
+    sent = _sent(scene, topic.name)
+    printed = _numbers_printed(scene)
+    missing = [row for row in sent if int(row.data) not in printed.get(row.at, frozenset())]
+    strange = set().union(*printed.values()) - {int(row.data) for row in sent} if printed else set()
+    if sent and not missing:
+        return failed(check, "noise") if len(_plausible(strange)) > NOISE else passed(check)
+    died = scene.ended_by_itself(scene.scene.label)
+    if died and not any(row.topic == topic.name for row in scene.sent):
+        return failed(check, "died", error=scene.error_of(scene.scene.label))
+    if died and not any(row.topic != topic.name for row in scene.sent):
+        return failed(check, "died-on-number", error=scene.error_of(scene.scene.label))
+    if wrong := _unsuitable(check, topic.name, topic.type, scene):
+        return wrong
+    if died:
+        return failed(check, "died", error=scene.error_of(scene.scene.label))
+    if len(missing) == len(sent):
+        return failed(check, "silent", sent=len(sent), shown=_last_line(scene))
+    examples = ", ".join(str(row.data) for row in missing[:5])
+    return failed(check, "some", sent=len(sent), missing=len(missing), examples=examples)
+
+
+def listener_chatter(view: View, earlier: Earlier) -> Verdict:
+    """It still receives and prints what comes on `/chatter`."""
+    check = "listener-chatter"
+    scene = view.scene(SceneName.LISTENER)
+    if scene is None:
+        return blocked(check, "listener-numeric")
+    if scene.scene.fault:
+        return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
+    topic = view.specification.text_topic
+    sent = _sent(scene, topic.name)
+    lines = [(line.at, said(line.text)) for line in scene.lines]
+    missing = [row for row in sent if not any(at >= row.at and str(row.data) in text for at, text in lines)]
+    if sent and not missing:
+        return passed(check)
+    if earlier["listener-numeric"].message in ("died", "died-on-number"):
+        return blocked(check, "listener-numeric")
+    if wrong := _unsuitable(check, topic.name, topic.type, scene):
+        return wrong
+    if scene.ended_by_itself(scene.scene.label):
+        return failed(check, "died", error=scene.error_of(scene.scene.label))
+    return failed(check, "silent", sent=len(sent), missing=len(missing), shown=_last_line(scene))
+
+
+def _sent(scene: SceneView, topic: str) -> list[Sent]:
+    """What was sent there once both sides had found each other; before that nothing counts."""
+    begin = scene.phases.get("send", float("inf"))
+    return [row for row in scene.sent if row.topic == topic and row.at >= begin]
+
+
+def _numbers_printed(scene: SceneView) -> dict[float, frozenset[int]]:
+    """For each message that was sent, the numbers that were printed from then on."""
+    texts = [str(row.data) for row in scene.sent if isinstance(row.data, str)]
+    lines = [(line.at, numbers_in(line.text, texts)) for line in scene.lines]
+    found: dict[float, frozenset[int]] = {}
+    later: frozenset[int] = frozenset()
+    for row in sorted(scene.sent, key=lambda row: row.at, reverse=True):
+        while lines and lines[-1][0] >= row.at:
+            later |= lines.pop()[1]
+        found[row.at] = later
+    return found
+
+
+def _plausible(numbers: set[int]) -> set[int]:
+    """Those that an Int8 could have carried."""
+    return {number for number in numbers if -128 <= number <= 127}
+
+
+def _unsuitable(check: str, topic: str, type_name: str, scene: SceneView) -> Verdict | None:
+    """Why the listener could receive nothing on *topic*, as the graph shows it; None when it could."""
+    subscriptions = scene.appeared("subscription")
+    mine = [endpoint for endpoint in subscriptions if endpoint.topic == topic]
+    if not mine:
+        others = {endpoint.topic for endpoint in subscriptions if not endpoint.topic.startswith("/parameter")}
+        near = _near_subscription(topic, type_name, subscriptions)
+        if near:
+            return failed(check, "near-topic", near=near, near_name=near.lstrip("/"))
+        return failed(check, "no-subscription", others=names(others))
+    if all(endpoint.type != type_name for endpoint in mine):
+        return failed(check, "wrong-type", found=names(endpoint.type for endpoint in mine))
+    right = [endpoint for endpoint in mine if endpoint.type == type_name]
+    if all(endpoint.durability == "transient-local" for endpoint in right):
+        return failed(check, "qos", found="transient local")
+    return None
+
+
+def _near_subscription(topic: str, type_name: str, subscriptions: list[Endpoint]) -> str:
+    """The subscription that was probably meant: of the same type, or of nearly the same name."""
+    same_type = {endpoint.topic for endpoint in subscriptions if endpoint.type == type_name}
+    if len(same_type) == 1:
+        return same_type.pop()
+    return nearest(topic, (endpoint.topic for endpoint in subscriptions))
+
+
+def _last_line(scene: SceneView) -> str:
+    lines = [said(line.text) for line in scene.lines if line.text.strip()]
+    return f"the last line it printed was '{lines[-1]}'" if lines else "it printed nothing at all"

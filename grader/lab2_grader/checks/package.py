@@ -1,0 +1,84 @@
+"""Whether the package builds and offers the executables (worksheet 6.7.4 and 6.7.5)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from lab2_grader.checks.verdicts import failed, inconclusive, passed
+from lab2_grader.checks.view import View, names
+from lab2_grader.near import nearest
+from lab2_grader.records import Build, EndedBy, Verdict
+
+Earlier = Mapping[str, Verdict]
+
+SYNTAX_ERROR = re.compile(r'File "[^"]*?([\w./-]+\.py)", line (\d+)')
+ERROR_LINE = re.compile(r"^\s*((?:[A-Za-z_.]*(?:Error|Exception)|error)\b.*)$")
+
+
+def package_builds(view: View, earlier: Earlier) -> Verdict:
+    """The package is found and `colcon build` builds it."""
+    check, build = "package-builds", view.build
+    if build is None:
+        fault = view.evidence.faults[0] if view.evidence.faults else "the build was never reached"
+        return inconclusive(check, "inconclusive-scene", fault=fault)
+    if build.ok:
+        return passed(check)
+    if build.ended_by is EndedBy.DEADLINE:
+        return failed(check, "time", seconds=round(build.seconds))
+    if build.ended_by is EndedBy.LIMIT:
+        return failed(check, "limit", what=build.limit)
+    if build.code == 0:
+        return failed(check, "nothing-installed")
+    error = _last_error(build)
+    where = SYNTAX_ERROR.findall(build.log)
+    if where and error.startswith(("SyntaxError", "IndentationError", "TabError")):
+        file, line = where[-1]
+        return failed(check, "syntax", file=file.rsplit("/", 1)[-1], line=int(line), error=error)
+    return failed(check, "error", error=error)
+
+
+def _last_error(build: Build) -> str:
+    found = [match[1] for line in build.log.splitlines() if (match := ERROR_LINE.match(line))]
+    lines = [line for line in build.log.splitlines() if line.strip()]
+    return found[-1] if found else lines[-1] if lines else f"exit code {build.code}"
+
+
+def entry_points(view: View, earlier: Earlier) -> Verdict:
+    """Executables `numeric_talker` and `numeric_listener` exist; `talker` and `listener` still do."""
+    check, build, specification = "entry-points", view.build, view.specification
+    assert build is not None
+    original = (specification.original.talker, specification.original.listener)
+    numeric = (specification.numeric.talker, specification.numeric.listener)
+    missing = [name for name in (*numeric, *original) if name not in build.executables]
+    found = names(build.executables)
+    if missing:
+        if not build.executables and build.entry_points:
+            return failed(check, "dash")
+        lost = [name for name in missing if name in original]
+        if lost and len(lost) == len(missing):
+            return failed(check, "replaced", name=lost[0], missing=names(lost), found=found)
+        for name in missing:
+            if near := nearest(name, build.executables, (*numeric, *original)):
+                return failed(check, "near", name=name, near=near)
+        return failed(check, "missing", name=missing[0], missing=names(missing), found=found)
+    targets = {point.name: point.target for point in build.entry_points}
+    for name in (*numeric, *original):
+        if name in build.dangling:
+            return failed(check, "dangling", name=name, target=targets[name], modules=names(build.modules))
+    for name in (*numeric, *original):
+        if name in targets and _function_is_missing(view, name, targets[name]):
+            return failed(check, "function", name=name, target=targets[name])
+    return passed(check)
+
+
+def _function_is_missing(view: View, name: str, target: str) -> bool:
+    """Whether the executable was run and said that its module has no such function."""
+    module, _, function = target.partition(":")
+    said = f"module '{module.strip()}' has no attribute '{function.strip()}'"
+    return any(
+        said in line.text
+        for scene in view.scenes()
+        for line in scene.lines
+        if line.source == name
+    )

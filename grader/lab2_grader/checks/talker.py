@@ -1,0 +1,197 @@
+"""What the numeric talker publishes (worksheet 6.7.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from lab2_grader.checks import source
+from lab2_grader.checks.sequence import Sequel, Step, analyse, around
+from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
+from lab2_grader.checks.view import SceneView, View, names
+from lab2_grader.near import nearest
+from lab2_grader.records import Status, Verdict
+
+Earlier = Mapping[str, Verdict]
+
+SILENT_SECONDS = 3.0  # no message for so long before the scene was stopped: it had stopped by itself
+
+
+def talker_type(view: View, earlier: Earlier) -> Verdict:
+    """`/numeric_chatter` carries `std_msgs/msg/Int8`, and a default subscription receives it."""
+    check = "talker-type"
+    scene = view.talking
+    if scene is None:
+        return failed(check, "missing")
+    if scene.scene.fault:
+        return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
+    topic = view.specification.number_topic
+    publishers = view.number_publishers
+    died = scene.ended_by_itself(view.talker_name)
+    error = scene.error_of(view.talker_name)
+    if died and not view.numbers:
+        wrong_message = publishers and ("TypeError" in error or "AttributeError" in error or "Assertion" in error)
+        return failed(check, "wrong-message" if wrong_message else "died", error=error, talker=view.talker_name)
+    if not publishers:
+        return _elsewhere(view)
+    types = {endpoint.type for endpoint in publishers}
+    if len(types) > 1:
+        return failed(check, "two-types", found=names(types))
+    if topic.type not in types:
+        return failed(check, "wrong-type", found=names(types))
+    if all(endpoint.reliability == "best-effort" for endpoint in publishers):
+        return failed(check, "best-effort")
+    return passed(check)
+
+
+def _elsewhere(view: View) -> Verdict:
+    check, topic = "talker-type", view.specification.number_topic
+    near = view.stray_number_topic or nearest(topic.name, (endpoint.topic for endpoint in view.published))
+    if near:
+        found = names(endpoint.type for endpoint in view.published if endpoint.topic == near)
+        return failed(check, "near-topic", near=near, found=found, near_name=near.lstrip("/"))
+    return failed(check, "no-topic", others=names(endpoint.topic for endpoint in view.published))
+
+
+def talker_start(view: View, earlier: Earlier) -> Verdict:
+    """The count begins at 0."""
+    check = "talker-start"
+    if stop := _unheard(check, view, earlier):
+        return stop
+    sequel = _sequel(view)
+    if sequel is None:
+        return failed(check, "not-numbers", shown=", ".join(str(message.data) for message in view.numbers[:3]))
+    smallest = view.specification.number_topic.smallest
+    missed = sequel.first_number - 1
+    if missed and not sequel.common_rise:
+        return blocked(check, "talker-step") if sequel.irregular else inconclusive(check, "inconclusive-lost")
+    first = sequel.values[0] - missed * sequel.common_rise
+    if first == smallest:
+        return passed(check)
+    return failed(check, "other", first=first, shown=around(sequel.values, 0))
+
+
+def talker_step(view: View, earlier: Earlier) -> Verdict:
+    """Each number is one more than the last."""
+    check = "talker-step"
+    if stop := _unheard(check, view, earlier):
+        return stop
+    sequel = _sequel(view)
+    if sequel is None or not sequel.values:
+        return blocked(check, "talker-start")
+    if len(sequel.values) == 1:
+        return failed(check, "once", shown=str(sequel.values[0]))
+    irregular = sequel.irregular
+    if not irregular:
+        return passed(check)
+    shown = around(sequel.values, irregular[0].index)
+    rise = sequel.common_rise
+    if rise == 0 and all(step.difference == 0 for step in irregular) and len(set(sequel.values)) == 1:
+        return failed(check, "constant", shown=around(sequel.values, 0))
+    if rise < 0:
+        return failed(check, "down", shown=shown)
+    if rise > 1:
+        file, line = source.second_increment(view)
+        return failed(check, "by", file, line, step=rise, shown=shown)
+    total = len(sequel.rises)
+    return failed(check, "irregular", count=len(irregular), total=total, before=irregular[0].before, shown=shown)
+
+
+def talker_wrap(view: View, earlier: Earlier) -> Verdict:
+    """At 127 the count goes back to 0, and it never leaves 0 to 127."""
+    check = "talker-wrap"
+    if stop := _unheard(check, view, earlier):
+        return stop
+    sequel, scene = _sequel(view), view.talking
+    assert scene is not None
+    if sequel is None or not sequel.values:
+        return blocked(check, "talker-start")
+    topic = view.specification.number_topic
+    rise = sequel.common_rise
+    if rise < 1:
+        return blocked(check, "talker-step")
+    if sequel.stays:
+        return failed(check, "stuck", shown=around(sequel.values, sequel.stays[0].index))
+    if wrong := next((step for step in sequel.returns if not _returns_well(step, rise, view)), None):
+        return _bad_return(wrong, sequel, view)
+    outside = next((i for i, v in enumerate(sequel.values) if not topic.smallest <= v <= topic.largest), None)
+    if outside is not None:
+        key = "too-large" if sequel.values[outside] > topic.largest else "negative"
+        return failed(check, key, shown=around(sequel.values, outside))
+    if sequel.returns:
+        return passed(check)
+    return _never_returned(sequel, view, scene)
+
+
+def _returns_well(step: Step, rise: int, view: View) -> bool:
+    """Back to the smallest number, from the largest or the one before; with a rise of n, from one of the last n."""
+    topic = view.specification.number_topic
+    return step.after == topic.smallest and topic.largest - max(rise, 2) < step.before <= topic.largest
+
+
+def _bad_return(step: Step, sequel: Sequel, view: View) -> Verdict:
+    check, topic = "talker-wrap", view.specification.number_topic
+    shown = around(sequel.values, step.index)
+    if step.after == -topic.largest - 1:
+        return failed(check, "overflow", next=step.after, shown=shown)
+    if step.before > topic.largest:
+        return failed(check, "too-large", shown=shown)
+    file, line = source.wrap_comparison(view)
+    if step.after == topic.smallest:
+        return failed(check, "returns-at", file, line, last=step.before, shown=shown)
+    return failed(check, "returns-to", file, line, last=step.before, next=step.after, shown=shown)
+
+
+def _never_returned(sequel: Sequel, view: View, scene: SceneView) -> Verdict:
+    check, last = "talker-wrap", sequel.values[-1]
+    if scene.ended_by_itself(view.talker_name):
+        return failed(check, "died", last=last, error=scene.error_of(view.talker_name), talker=view.talker_name)
+    silent = scene.phases.get("stop", 0.0) - view.numbers[-1].at
+    if silent > max(SILENT_SECONDS, 2.5 * scene.measured.get("period_seconds", 0.0)):
+        return failed(check, "silent", last=last)
+    return inconclusive(check, "inconclusive-time")
+
+
+def talker_chatter(view: View, earlier: Earlier) -> Verdict:
+    """The same node still publishes String messages on `/chatter`."""
+    check = "talker-chatter"
+    scene = view.talking
+    if scene is None:
+        return blocked(check, "talker-type")
+    if scene.scene.fault:
+        return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
+    topic = view.specification.text_topic
+    publishers = [endpoint for endpoint in view.text_publishers if endpoint.type == topic.type]
+    if any(message.type == topic.type for message in view.texts):
+        if all(endpoint.reliability == "best-effort" for endpoint in publishers):
+            return failed(check, "best-effort")
+        return passed(check)
+    if earlier["talker-type"].message in ("died", "wrong-message"):
+        return blocked(check, "talker-type")
+    if publishers:
+        if overwritten := source.overwritten_publisher(view):
+            attribute, file, line = overwritten
+            return failed(check, "overwritten", file, line, attribute=attribute)
+        return failed(check, "silent")
+    if view.text_publishers:
+        return failed(check, "wrong-type", found=names(endpoint.type for endpoint in view.text_publishers))
+    if near := next((endpoint.topic for endpoint in view.published if endpoint.type == topic.type), ""):
+        return failed(check, "near-topic", near=near)
+    return failed(check, "removed")
+
+
+def _sequel(view: View) -> Sequel | None:
+    return analyse(view.numbers, view.specification.number_topic.largest)
+
+
+def _unheard(check: str, view: View, earlier: Earlier) -> Verdict | None:
+    """Why nothing can be said of the count; None when numbers were heard."""
+    base = earlier["talker-type"]
+    if base.status is Status.INCONCLUSIVE:
+        return inconclusive(check, "inconclusive-scene", fault=view.talking.scene.fault if view.talking else "")
+    if view.numbers:
+        return None
+    if base.status is Status.FAIL:
+        return blocked(check, "talker-type")
+    if check == "talker-start":
+        return failed(check, "silent")
+    return blocked(check, "talker-start")

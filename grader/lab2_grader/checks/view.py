@@ -1,0 +1,204 @@
+"""What the checks look at: the evidence of one submission, sorted by question. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+
+from lab2_grader import lab, reading
+from lab2_grader.records import (
+    Build,
+    EndedBy,
+    Endpoint,
+    Event,
+    Evidence,
+    Line,
+    Measured,
+    Message,
+    Phase,
+    ProcessGone,
+    ProcessSeen,
+    ProgramEnded,
+    Scene,
+    SceneName,
+    Sent,
+    Unsupported,
+)
+
+TRACEBACK = "Traceback (most recent call last):"
+
+
+class SceneView:
+    """One scene, its events sorted by kind.
+
+    Args:
+        scene: As it was played.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.endpoints: list[Endpoint] = []
+        self.messages: list[Message] = []
+        self.lines: list[Line] = []
+        self.sent: list[Sent] = []
+        self.seen: list[ProcessSeen] = []
+        self.gone: list[ProcessGone] = []
+        self.unsupported: list[Unsupported] = []
+        self.measured: dict[str, float] = {}
+        self.phases: dict[str, float] = {}
+        self.ended: ProgramEnded | None = None
+        for event in scene.events:
+            self._sort(event)
+
+    def _sort(self, event: Event) -> None:
+        match event:
+            case Message():
+                self.messages.append(event)
+            case Line():
+                self.lines.append(event)
+            case Endpoint():
+                self.endpoints.append(event)
+            case Sent():
+                self.sent.append(event)
+            case ProcessSeen():
+                self.seen.append(event)
+            case ProcessGone():
+                self.gone.append(event)
+            case Measured():
+                self.measured[event.name] = event.value
+            case Phase():
+                self.phases[event.name] = event.at
+            case ProgramEnded():
+                self.ended = event
+            case Unsupported():
+                self.unsupported.append(event)
+
+    def appeared(self, kind: str) -> list[Endpoint]:
+        """The publishers, or the subscriptions, that appeared."""
+        return [endpoint for endpoint in self.endpoints if endpoint.kind == kind and endpoint.event == "appeared"]
+
+    def started(self) -> dict[str, int]:
+        """How often each executable was started: as the launcher says, or as it was seen to run, whichever is more."""
+        announced: dict[str, int] = {}
+        for line in self.lines:
+            match = reading.PROCESS_STARTED.match(line.text) if line.source == "launch" else None
+            if match:
+                announced[match[1]] = announced.get(match[1], 0) + 1
+        running: dict[str, int] = {}
+        for process in self.seen:
+            running[process.executable] = running.get(process.executable, 0) + 1
+        return {
+            name: announced.get(name, 0) or running.get(name, 0) for name in sorted(announced.keys() | running.keys())
+        }
+
+    def ended_by_itself(self, executable: str) -> bool:
+        """Whether *executable* was running, or was started, and ended before the grader stopped the scene."""
+        if self.scene.label:
+            return self.ended is not None and self.ended.by is not EndedBy.GRADER
+        pids = {process.pid for process in self.seen if process.executable == executable}
+        if any(gone.pid in pids and gone.by is EndedBy.ITSELF for gone in self.gone):
+            return True
+        return any(
+            (match := reading.PROCESS_DIED.match(line.text)) is not None and match[1] == executable
+            for line in self.lines
+            if line.source == "launch"
+        )
+
+    def lines_of(self, executable: str) -> list[Line]:
+        """What *executable* printed."""
+        return [line for line in self.lines if line.source == executable]
+
+    def error_of(self, source: str) -> str:
+        """The last line of the last traceback that *source* printed, else the last line it printed at all."""
+        texts = [line.text for line in self.lines if line.source == source]
+        starts = [index for index, text in enumerate(texts) if TRACEBACK in text]
+        if starts:
+            body = texts[starts[-1] + 1 :]
+            closing = next((text for text in body if text and not text.startswith((" ", "\t", "["))), "")
+            if closing:
+                return closing
+        limit = self.ended.limit if self.ended is not None else ""
+        if limit:
+            return f"it struck the limit of {limit}"
+        return next((reading.said(text) for text in reversed(texts) if text.strip()), "it printed nothing")
+
+
+class View:
+    """The evidence of one submission, with the answers that several checks need."""
+
+    def __init__(self, evidence: Evidence) -> None:
+        self.evidence = evidence
+        self.specification = lab.specification()
+        self._scenes = {scene.name: SceneView(scene) for scene in evidence.scenes}
+
+    def scene(self, name: SceneName) -> SceneView | None:
+        """That scene, None when it was not played."""
+        return self._scenes.get(name)
+
+    def scenes(self) -> tuple[SceneView, ...]:
+        """Every scene that was played."""
+        return tuple(self._scenes.values())
+
+    @property
+    def build(self) -> Build | None:
+        """What was built."""
+        return self.evidence.build
+
+    def source(self, path: str) -> str:
+        """The text of a file of the package; empty when it is not there."""
+        return next((file.text for file in self.evidence.submission.sources if file.path == path), "")
+
+    @cached_property
+    def talking(self) -> SceneView | None:
+        """The scene on which the talker is judged: by itself where it had to be, else the launched pair."""
+        return self.scene(SceneName.TALKER) or self.scene(SceneName.CONVERSATION)
+
+    @cached_property
+    def talker_name(self) -> str:
+        """The executable that stood for the talker."""
+        scene = self.talking
+        return (scene.scene.label if scene else "") or self.specification.numeric.talker
+
+    @cached_property
+    def number_publishers(self) -> list[Endpoint]:
+        """Publishers on the topic of numbers."""
+        return self._publishers_on(self.specification.number_topic.name)
+
+    @cached_property
+    def text_publishers(self) -> list[Endpoint]:
+        """Publishers on the topic of texts."""
+        return self._publishers_on(self.specification.text_topic.name)
+
+    def _publishers_on(self, topic: str) -> list[Endpoint]:
+        return [endpoint for endpoint in self.published if endpoint.topic == topic]
+
+    @cached_property
+    def published(self) -> list[Endpoint]:
+        """Every publisher of the talker's scene."""
+        return self.talking.appeared("publisher") if self.talking else []
+
+    @cached_property
+    def stray_number_topic(self) -> str:
+        """Where the numbers go instead, when nothing is published on the topic asked for; empty when nowhere."""
+        if self.number_publishers:
+            return ""
+        text_type = self.specification.text_topic.type
+        others = [endpoint.topic for endpoint in self.published if endpoint.type != text_type]
+        return others[0] if len(set(others)) == 1 else ""
+
+    @cached_property
+    def numbers(self) -> list[Message]:
+        """What the talker published as its count, wherever it did."""
+        topic = self.stray_number_topic or self.specification.number_topic.name
+        return [message for message in self.talking.messages if message.topic == topic] if self.talking else []
+
+    @cached_property
+    def texts(self) -> list[Message]:
+        """What the talker published on the topic of texts."""
+        topic = self.specification.text_topic.name
+        return [message for message in self.talking.messages if message.topic == topic] if self.talking else []
+
+
+def names(values: Iterable[str]) -> str:
+    """*values* as a list for people; a dash when there are none."""
+    return ", ".join(sorted(set(values))) or "nothing"

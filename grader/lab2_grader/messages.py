@@ -1,0 +1,76 @@
+"""The catalogue of sentences for people, `facts/messages.toml`: the only place where they are written."""
+
+from __future__ import annotations
+
+import functools
+
+import msgspec
+
+from lab2_grader import lab
+from lab2_grader.errors import RefusedError
+from lab2_grader.records import Record
+from lab2_grader.text import clean
+
+VALUE_LENGTH = 300  # characters of one value filled into a sentence
+
+
+class Fault(Record):
+    """One way to miss a check, with `str.format` placeholders; `symptom` is the id of a troubleshooting row."""
+
+    observed: str
+    hint: str
+    symptom: str = ""
+
+
+class CheckTexts(Record):
+    """What is said of one check: what it asks, how it is judged, the ruling where the worksheet is silent."""
+
+    expected: str
+    judged: str
+    ruling: str
+    fault: dict[str, Fault]
+
+
+class Refusal(Record):
+    """The sentence of one rule of submission, with `str.format` placeholders."""
+
+    text: str
+
+
+class Catalogue(Record):
+    """`messages.toml`."""
+
+    check: dict[str, CheckTexts]
+    status: dict[str, str]
+    note: dict[str, str]
+    refusal: dict[str, Refusal] = {}
+
+
+Value = str | int | float
+
+
+@functools.cache
+def catalogue() -> Catalogue:
+    """The catalogue."""
+    return msgspec.toml.decode((lab.FACTS / "messages.toml").read_bytes(), type=Catalogue)
+
+
+def fill(text: str, **values: Value) -> str:
+    """*text* with *values* in its placeholders, each cleaned, because it may come from the submission."""
+    shown = {key: clean(value, VALUE_LENGTH) if isinstance(value, str) else f"{value:,}" for key, value in values.items()}
+    return text.format_map(shown)
+
+
+def status(key: str, **values: Value) -> str:
+    """The sentence of `[status]` under *key*."""
+    return fill(catalogue().status[key], **values)
+
+
+def note(key: str, **values: Value) -> str:
+    """The sentence of `[note]` under *key*."""
+    return fill(catalogue().note[key], **values)
+
+
+def refusal(rule: str, **values: Value) -> RefusedError:
+    """The refusal under *rule*."""
+    return RefusedError(rule, fill(catalogue().refusal[rule].text, **values))
