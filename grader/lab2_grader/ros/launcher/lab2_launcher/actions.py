@@ -6,8 +6,8 @@ import os
 import warnings
 from collections.abc import Iterable
 
-from lab2_launcher import events
-from lab2_launcher.core import (
+from . import events
+from .core import (
     Action,
     BaseEventHandler,
     Event,
@@ -20,16 +20,16 @@ from lab2_launcher.core import (
     perform_substitutions,
     perform_typed_substitution,
 )
-from lab2_launcher.output import log
-from lab2_launcher.sources import IncludeLaunchDescription
+from .output import log
+from .sources import IncludeLaunchDescription
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from typing import Any
 
-    from lab2_launcher.core import SomeSubstitutionsType
-    from lab2_launcher.service import Timer
+    from .core import SomeSubstitutionsType
+    from .service import Timer
 
 __all__ = ["IncludeLaunchDescription"]
 
@@ -293,7 +293,9 @@ class EmitEvent(Action):
     def __init__(self, *, event: Event, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         if not isinstance(event, Event):
-            raise RuntimeError(f"EmitEvent() expected an event instance, got '{event}'.")
+            raise RuntimeError(  # noqa: TRY004 - the real one's
+                f"EmitEvent() expected an event instance, got '{event}'."
+            )
         self.event = event
 
     def execute(self, context: LaunchContext) -> None:
@@ -419,4 +421,3 @@ class TimerAction(Action):
             self._timer.cancel()
             self._timer = None
             self._context.service.end(self)
-

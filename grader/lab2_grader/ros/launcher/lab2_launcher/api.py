@@ -42,8 +42,22 @@ _HOMES = {
 
 # Packages of a ROS 2 Jazzy desktop that a launch file may import and that are not there when this launcher is needed.
 _ABSENT = frozenset(
-    "ament_index_python composition_interfaces launch_pytest launch_testing launch_testing_ros launch_xml launch_yaml"
-    " lifecycle_msgs osrf_pycommon ros2cli ros2launch ros2pkg ros2run xacro".split()
+    (
+        "ament_index_python",
+        "composition_interfaces",
+        "launch_pytest",
+        "launch_testing",
+        "launch_testing_ros",
+        "launch_xml",
+        "launch_yaml",
+        "lifecycle_msgs",
+        "osrf_pycommon",
+        "ros2cli",
+        "ros2launch",
+        "ros2pkg",
+        "ros2run",
+        "xacro",
+    )
 )
 
 
@@ -140,7 +154,7 @@ class _Module(ModuleType):
         while prefix not in _HOMES and "." in prefix:
             prefix = prefix.rpartition(".")[0]
         for home in _HOMES.get(prefix, ()):
-            module = import_module(f"lab2_launcher.{home}")
+            module = import_module(f"{__package__}.{home}")
             if hasattr(module, name):
                 return getattr(module, name)
         return _stand_in(self.__name__, name)
@@ -163,7 +177,7 @@ class _Finder:
         if name.partition(".")[0] not in _ROOTS:
             return None
         module_names(name)
-        return ModuleSpec(name, _Loader(), origin=__file__, is_package=True) if name in _modules else None
+        return ModuleSpec(name, _Loader(), origin=__file__, is_package=True) if name in _modules else None  # type: ignore[arg-type]
 
 
 class _LastFinder:
@@ -173,7 +187,7 @@ class _LastFinder:
     def find_spec(name: str, path: Sequence[str] | None = None, target: object = None) -> ModuleSpec | None:
         if name.partition(".")[0] not in _ABSENT:
             return None
-        return ModuleSpec(name, _Loader(), origin=__file__, is_package=True)
+        return ModuleSpec(name, _Loader(), origin=__file__, is_package=True)  # type: ignore[arg-type]
 
 
 class _Loader:
@@ -190,5 +204,5 @@ class _Loader:
 
 def install() -> None:
     """Make `launch` and `launch_ros` importable."""
-    sys.meta_path.insert(0, _Finder)  # type: ignore[arg-type]
-    sys.meta_path.append(_LastFinder)  # type: ignore[arg-type]
+    sys.meta_path.insert(0, _Finder)
+    sys.meta_path.append(_LastFinder)

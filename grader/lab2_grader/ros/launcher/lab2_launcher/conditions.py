@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 
-from lab2_launcher.core import (
+from .core import (
     Condition,
     LaunchContext,
     Substitution,
@@ -16,7 +16,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from lab2_launcher.core import SomeSubstitutionsType
+    from .core import SomeSubstitutionsType
 
 _TRUTHS = {"true": True, "1": True, "false": False, "0": False}
 

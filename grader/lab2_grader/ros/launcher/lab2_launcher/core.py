@@ -5,15 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 
-from lab2_launcher import api
-from lab2_launcher.output import log
+from . import api
+from .output import log
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, MutableMapping
     from typing import Any
 
-    from lab2_launcher.service import LaunchService
+    from .service import LaunchService
 
 
 class Known:
@@ -74,7 +74,8 @@ def normalize_to_list_of_substitutions(subs: SomeSubstitutionsType) -> list[Subs
         return [TextSubstitution(text=subs)]
     if isinstance(subs, Substitution):
         return [subs]
-    return [_normalized(entry) for entry in subs]
+    entries: Iterable[object] = subs
+    return [_normalized(entry) for entry in entries]
 
 
 def _normalized(entry: object) -> Substitution:
@@ -117,7 +118,7 @@ def yaml_value(text: str) -> Any:
     """What *text* means in YAML, the rule by which launch finds the type of a performed substitution."""
     if text.isascii() and text.isalpha() and text.lower() not in _YAML_WORDS:
         return text
-    import yaml  # costs 30 ms, and comes with rclpy
+    import yaml  # type: ignore[import-untyped, unused-ignore]  # costs 30 ms, and comes with rclpy
 
     return yaml.safe_load(text)
 
@@ -439,14 +440,12 @@ class LaunchDescription(LaunchDescriptionEntity):
         self, conditional_inclusion: bool = False
     ) -> list[tuple[Any, Any]]:
         """The declared launch arguments, each with the include actions around it (None: the file's own)."""
-        from lab2_launcher.actions import DeclareLaunchArgument, ResetLaunchConfigurations
-        from lab2_launcher.sources import IncludeLaunchDescription
+        from .actions import DeclareLaunchArgument, ResetLaunchConfigurations
+        from .sources import IncludeLaunchDescription
 
         found: dict[str, tuple[DeclareLaunchArgument, list[IncludeLaunchDescription] | None]] = {}
 
-        def search(
-            entities: Iterable[LaunchDescriptionEntity], conditional: bool, includes: list[Any] | None
-        ) -> None:
+        def search(entities: Iterable[LaunchDescriptionEntity], conditional: bool, includes: list[Any] | None) -> None:
             for entity in entities:
                 if isinstance(entity, DeclareLaunchArgument) and entity.name not in found:
                     entity.conditionally_included = conditional or entity.condition is not None

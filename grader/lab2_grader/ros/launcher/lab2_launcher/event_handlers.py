@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from lab2_launcher.core import Action, BaseEventHandler, Event, ExecutionComplete, LaunchContext, LaunchDescriptionEntity
-from lab2_launcher.events import ProcessExited, ProcessIO, ProcessStarted, Shutdown
-from lab2_launcher.process import ExecuteLocal
+from .core import Action, BaseEventHandler, Event, ExecutionComplete, LaunchContext, LaunchDescriptionEntity
+from .events import ProcessExited, ProcessIO, ProcessStarted, Shutdown
+from .process import ExecuteLocal
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -31,9 +31,8 @@ class OnActionEventBase(BaseEventHandler):
         target_action_cls: type[Action],
         handle_once: bool = False,
     ) -> None:
-        if action_matcher is not None and not isinstance(action_matcher, target_action_cls):
-            if not callable(action_matcher):
-                raise TypeError(f"action_matcher must be an '{target_action_cls.__name__}' instance or a callable")
+        if not (action_matcher is None or isinstance(action_matcher, target_action_cls) or callable(action_matcher)):
+            raise TypeError(f"action_matcher must be an '{target_action_cls.__name__}' instance or a callable")
 
         def matches(event: Any) -> bool:
             if not isinstance(event, target_event_cls):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import signal as signals
 
-from lab2_launcher.core import Action, Event, ExecutionComplete, ensure_argument_type
+from .core import Action, Event, ExecutionComplete, ensure_argument_type
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from lab2_launcher.actions import TimerAction
-    from lab2_launcher.process import ExecuteLocal
+    from .actions import TimerAction
+    from .process import ExecuteLocal
 
 __all__ = ["ExecutionComplete"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 
-from lab2_launcher import api
+from . import api
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

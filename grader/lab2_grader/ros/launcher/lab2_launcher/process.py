@@ -7,9 +7,9 @@ import os
 import subprocess
 from contextlib import suppress
 
-from lab2_launcher import events
-from lab2_launcher.conditions import evaluate_condition_expression
-from lab2_launcher.core import (
+from . import events
+from .conditions import evaluate_condition_expression
+from .core import (
     Action,
     BaseEventHandler,
     Event,
@@ -21,20 +21,22 @@ from lab2_launcher.core import (
     perform_substitutions,
     perform_typed_substitution,
 )
-from lab2_launcher.output import STDERR, STDOUT, Lines, log
-from lab2_launcher.substitutions import LaunchConfiguration
+from .output import STDERR, STDOUT, Lines, log
+from .substitutions import LaunchConfiguration
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from typing import Any
 
-    from lab2_launcher.core import SomeSubstitutionsType, Substitution
-    from lab2_launcher.service import LaunchService, Timer
+    from .core import SomeSubstitutionsType, Substitution
+    from .service import LaunchService, Timer
 
 READ_BYTES = 65_536
 DRAIN_BYTES = 1_048_576  # as much as a pipe may hold: what a process wrote before it ended
 _OUTPUT_FORMAT = "[{this.process_description.final_name}] {line}"
+_SIGTERM_TIMEOUT = LaunchConfiguration("sigterm_timeout", default=5)
+_SIGKILL_TIMEOUT = LaunchConfiguration("sigkill_timeout", default=5)
 _numbers = itertools.count(1)
 
 if TYPE_CHECKING:
@@ -124,7 +126,7 @@ class _ProcessHandler(BaseEventHandler):
             self._action.shut_down(interrupt=not by_terminal)
 
 
-class _Stream:
+class Stream:
     """One stream of a running process, on its way to our own."""
 
     def __init__(self, fd: int, lines: Lines, number: int) -> None:
@@ -150,8 +152,8 @@ class ExecuteLocal(Action):
         *,
         process_description: Executable,
         shell: bool = False,
-        sigterm_timeout: SomeSubstitutionsType = LaunchConfiguration("sigterm_timeout", default=5),
-        sigkill_timeout: SomeSubstitutionsType = LaunchConfiguration("sigkill_timeout", default=5),
+        sigterm_timeout: SomeSubstitutionsType = _SIGTERM_TIMEOUT,
+        sigkill_timeout: SomeSubstitutionsType = _SIGKILL_TIMEOUT,
         emulate_tty: bool = False,
         output: Any = "log",  # what is printed goes to our own output, whatever is asked for
         output_format: str = _OUTPUT_FORMAT,
@@ -179,7 +181,7 @@ class ExecuteLocal(Action):
         self._respawns_left = respawn_max_retries if respawn_max_retries >= 0 else float("inf")
         self._context: LaunchContext | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self._streams: list[_Stream] = []
+        self._streams: list[Stream] = []
         self._timers: list[Timer] = []
         self._executed = False
         self._ending = False
@@ -216,7 +218,7 @@ class ExecuteLocal(Action):
         self._context = context
         context.register_event_handler(_ProcessHandler(self))
         if self._on_exit is not None:
-            from lab2_launcher.event_handlers import OnProcessExit
+            from .event_handlers import OnProcessExit
 
             context.register_event_handler(OnProcessExit(target_action=self, on_exit=self._on_exit))
         context.service.begin(self)
@@ -250,7 +252,7 @@ class ExecuteLocal(Action):
             log("INFO", self._name, f"process details: cmd='{shown}', cwd='{what.final_cwd}', custom_env?=True")
         try:
             self._spawn()
-        except Exception:
+        except Exception:  # noqa: BLE001 - whatever is wrong with the command is the launch file's
             from traceback import format_exc
 
             log("ERROR", self._name, f"exception occurred while executing process:\n{format_exc()}")
@@ -291,7 +293,7 @@ class ExecuteLocal(Action):
         self._streams = []
         for fd, number in ((out, STDOUT), (err, STDERR)):
             os.set_blocking(fd, False)
-            self._streams.append(_Stream(fd, self._lines(number), number))
+            self._streams.append(Stream(fd, self._lines(number), number))
 
     def _lines(self, number: int) -> Lines:
         decorate = None
@@ -302,11 +304,11 @@ class ExecuteLocal(Action):
 
         return Lines(number, f"[{self._name}] ", decorate)
 
-    def streams(self) -> list[_Stream]:
+    def streams(self) -> list[Stream]:
         """The streams that are to be read."""
         return self._streams
 
-    def relay(self, stream: _Stream, data: bytes) -> None:
+    def relay(self, stream: Stream, data: bytes) -> None:
         """Print *data*, and tell those who want to know."""
         stream.lines.feed(data)
         assert self._context is not None and self.process_details is not None
@@ -386,9 +388,7 @@ class ExecuteLocal(Action):
         for timer in self._timers:
             timer.cancel()
         seconds = perform_substitutions(self._context, self.sigkill_timeout)
-        self._timers = [
-            self._service.call_later(float(seconds), lambda: self._escalate(seconds, "SIGTERM", "SIGKILL"))
-        ]
+        self._timers = [self._service.call_later(float(seconds), lambda: self._escalate(seconds, "SIGTERM", "SIGKILL"))]
         self._send_named("SIGTERM")
 
     def kill(self) -> None:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
-from lab2_launcher.core import (
+from .core import (
     Action,
     LaunchContext,
     LaunchDescriptionEntity,
@@ -14,24 +14,24 @@ from lab2_launcher.core import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from lab2_launcher.output import log
-from lab2_launcher.process import ExecuteProcess
-from lab2_launcher.ros_parameters import (
+from .output import log
+from .process import ExecuteProcess
+from .ros_parameters import (
     Parameter,
     as_yaml,
     evaluate_parameter_dict,
     normalize_parameter_dict,
     normalize_parameters,
 )
-from lab2_launcher.ros_substitutions import ExecutableInPackage
-from lab2_launcher.substitutions import SubstitutionFailure
+from .ros_substitutions import ExecutableInPackage
+from .substitutions import SubstitutionFailure
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
-    from lab2_launcher.core import SomeSubstitutionsType, Substitution
+    from .core import SomeSubstitutionsType, Substitution
 
 
 # --- names --------------------------------------------------------------------------------------
@@ -165,9 +165,7 @@ class Node(ExecuteProcess):
 
     def is_node_name_fully_specified(self) -> bool:
         """Whether the launch file gives name and namespace."""
-        return not any(
-            part in self.node_name for part in (self.UNSPECIFIED_NODE_NAME, self.UNSPECIFIED_NODE_NAMESPACE)
-        )
+        return not any(part in self.node_name for part in (self.UNSPECIFIED_NODE_NAME, self.UNSPECIFIED_NODE_NAMESPACE))
 
     def execute(self, context: LaunchContext) -> Sequence[LaunchDescriptionEntity] | None:
         if not self._expanded:
@@ -282,8 +280,7 @@ class PushROSNamespace(Action):
             validate_namespace(namespace)
         except ValueError as error:
             raise SubstitutionFailure(
-                "The resulting namespace is invalid: "
-                f"[previous_namespace='{previous}', pushed_namespace='{pushed}']"
+                f"The resulting namespace is invalid: [previous_namespace='{previous}', pushed_namespace='{pushed}']"
             ) from error
         context.launch_configurations["ros_namespace"] = namespace
 

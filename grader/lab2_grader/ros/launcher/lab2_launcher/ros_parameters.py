@@ -6,8 +6,8 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from lab2_launcher import api
-from lab2_launcher.core import (
+from . import api
+from .core import (
     Known,
     LaunchContext,
     SomeSubstitutionsType_types_tuple,
@@ -25,7 +25,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from lab2_launcher.core import SomeSubstitutionsType
+    from .core import SomeSubstitutionsType
 
     # A name is a tuple of substitutions; a value a scalar, a tuple, or something to be performed.
     Normalized = dict[tuple[Substitution, ...], Any]
@@ -163,9 +163,7 @@ def _evaluate(context: LaunchContext, name: str, value: Any) -> Any:
         return _typed(name, perform_substitutions(context, value))
     if isinstance(value[0], list):
         items = [
-            entry[0]
-            if isinstance(entry[0], _SCALARS)
-            else yaml_value(perform_substitutions(context, entry))
+            entry[0] if isinstance(entry[0], _SCALARS) else yaml_value(perform_substitutions(context, entry))
             for entry in value
         ]
         return _uniform(name, items)

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import os
 
-from lab2_launcher import packages
-from lab2_launcher.core import (
+from . import packages
+from .core import (
     LaunchContext,
     Substitution,
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from lab2_launcher.substitutions import SubstitutionFailure, described, normalized_default
+from .substitutions import SubstitutionFailure, described, normalized_default
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from lab2_launcher.core import SomeSubstitutionsType
+    from .core import SomeSubstitutionsType
 
 
 class FindPackage(Substitution):

@@ -9,17 +9,17 @@ import signal
 import time
 from collections import deque
 
-from lab2_launcher import api, events, output
-from lab2_launcher.core import Action, LaunchContext, LaunchDescriptionEntity
-from lab2_launcher.output import log
-from lab2_launcher.process import READ_BYTES, ExecuteLocal
+from . import api, events, output
+from .core import Action, LaunchContext, LaunchDescriptionEntity
+from .output import log
+from .process import READ_BYTES, ExecuteLocal, Stream
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from typing import Any
 
-    from lab2_launcher.core import Event
+    from .core import Event
 
 
 class Timer:
@@ -156,13 +156,15 @@ class LaunchService:
             if key.data is None:
                 while self._read_wakeup(key.fd):
                     pass
-                continue
-            action, stream = key.data
-            data = stream.read(READ_BYTES)
-            if data:
-                self._guarded(lambda: action.relay(stream, data))
-            elif data is not None:
+            elif self._relay(*key.data):
                 self._selector.unregister(key.fd)
+
+    def _relay(self, action: ExecuteLocal, stream: Stream) -> bool:
+        """Print what there is; whether the stream is at its end."""
+        data = stream.read(READ_BYTES)
+        if data:
+            self._guarded(lambda: action.relay(stream, data))
+        return data == b""
 
     @staticmethod
     def _read_wakeup(fd: int) -> bytes:
@@ -187,7 +189,7 @@ class LaunchService:
             call()
         except output.ReaderGone:
             raise
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - the launch file can raise anything
             message = f"Caught exception in launch (see debug for traceback): {error}"
             log("ERROR", "launch", message)
             self._exit_code = 1
@@ -216,7 +218,9 @@ class LaunchService:
                     if entity is None:
                         continue
                     if not isinstance(entity, LaunchDescriptionEntity):
-                        raise RuntimeError(f"expected a LaunchDescriptionEntity from event_handler, got '{entity}'")
+                        raise RuntimeError(  # noqa: TRY004 - the real one's
+                            f"expected a LaunchDescriptionEntity from event_handler, got '{entity}'"
+                        )
                     self._visit(entity)
             finally:
                 self.context.pop_locals()

@@ -6,8 +6,8 @@ import os
 from contextlib import suppress
 from types import ModuleType
 
-from lab2_launcher import api
-from lab2_launcher.core import (
+from . import api
+from .core import (
     Action,
     InvalidLaunchFileError,
     Known,
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from typing import Any
 
-    from lab2_launcher.core import SomeSubstitutionsType
+    from .core import SomeSubstitutionsType
 
 _MARKUP = (".xml", ".yaml", ".yml", ".launch")
 
@@ -46,7 +46,7 @@ def load_python_launch_file_as_module(python_launch_file_path: str) -> ModuleTyp
     module.__file__ = python_launch_file_path
     with open(python_launch_file_path, "rb") as file:
         code = compile(file.read(), python_launch_file_path, "exec", dont_inherit=True)
-    exec(code, module.__dict__)
+    exec(code, module.__dict__)  # noqa: S102 - this is what the launcher is for
     return module
 
 
@@ -114,9 +114,7 @@ class LaunchDescriptionSource(Known):
         """The launch description, if its path does not depend on the launch and it can be loaded; else None."""
         if self._description is None:
             with suppress(Exception):
-                self._description = self._get_launch_description(
-                    perform_substitutions(LaunchContext(), self._location)
-                )
+                self._description = self._get_launch_description(perform_substitutions(LaunchContext(), self._location))
         return self._description
 
     def _get_launch_description(self, location: str) -> Any:
@@ -166,7 +164,7 @@ class IncludeLaunchDescription(Action):
         return [] if description is None else [description]
 
     def execute(self, context: LaunchContext) -> Sequence[LaunchDescriptionEntity]:
-        from lab2_launcher.actions import SetLaunchConfiguration
+        from .actions import SetLaunchConfiguration
 
         description = self.launch_description_source.get_launch_description(context)
         path = os.path.abspath(self.launch_description_source.location)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 
-from lab2_launcher import output
-from lab2_launcher.core import (
+from . import output
+from .core import (
     LaunchContext,
     Substitution,
     TextSubstitution,
@@ -21,7 +21,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from lab2_launcher.core import SomeSubstitutionsType
+    from .core import SomeSubstitutionsType
 
 __all__ = ["TextSubstitution"]  # it stands in `core`; offered from here
 
@@ -232,14 +232,16 @@ class Command(Substitution):
             raise SubstitutionFailure("expected 'on_stderr' to be one of: 'fail', 'ignore', 'warn' or 'capture'")
         stderr = subprocess.STDOUT if on_stderr == "capture" else subprocess.PIPE
         try:
-            result = subprocess.run(shlex.split(command), stdout=subprocess.PIPE, stderr=stderr, text=True)
+            result = subprocess.run(shlex.split(command), stdout=subprocess.PIPE, stderr=stderr, text=True, check=False)
         except FileNotFoundError as error:
             raise SubstitutionFailure(f"file not found: {error}") from error
         if result.returncode != 0:
             captured = f"\nCaptured stderr output: {result.stderr}" if result.stderr else ""
             raise SubstitutionFailure(f"executed command failed. Command: {command}{captured}")
         if result.stderr:
-            text = f"executed command showed stderr output. Command: {command}\nCaptured stderr output:\n{result.stderr}"
+            text = (
+                f"executed command showed stderr output. Command: {command}\nCaptured stderr output:\n{result.stderr}"
+            )
             if on_stderr == "fail":
                 raise SubstitutionFailure(text)
             if on_stderr == "warn":
@@ -323,7 +325,7 @@ class AnySubstitution(Substitution):
         self.args = [normalize_to_list_of_substitutions(arg) for arg in args]
 
     def perform(self, context: LaunchContext) -> str:
-        return _text(any([_truth(context, arg) for arg in self.args]))
+        return _text(any(_truth(context, arg) for arg in self.args))
 
 
 class AllSubstitution(Substitution):
@@ -333,7 +335,7 @@ class AllSubstitution(Substitution):
         self.args = [normalize_to_list_of_substitutions(arg) for arg in args]
 
     def perform(self, context: LaunchContext) -> str:
-        return _text(all([_truth(context, arg) for arg in self.args]))
+        return _text(all(_truth(context, arg) for arg in self.args))
 
 
 class IfElseSubstitution(Substitution):
