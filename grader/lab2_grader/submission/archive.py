@@ -140,11 +140,14 @@ class _Wary(io.RawIOBase):
         self.limited = False
 
     def read(self, size: int | None = -1, /) -> bytes:
-        if size is None or size < 0 or size > self._piece or (self.limited and size > self.allowance):
+        allowed = min(self._piece, self.allowance) if self.limited else self._piece
+        wanted = allowed + 1 if size is None or size < 0 else size
+        data = self._source.read(min(wanted, allowed + 1))
+        if wanted > allowed and len(data) > allowed:
             raise tarfile.ReadError("a header is larger than any honest one")
         if self.limited:
-            self.allowance -= size
-        return self._source.read(size)
+            self.allowance -= len(data)
+        return data
 
     def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
         return self._source.seek(offset, whence)
