@@ -45,6 +45,8 @@ def take(source: str, into: Path, *, commit: str | None = None, before: datetime
     with _workplace(into) as scratch:
         if is_address:
             return _from_address(source, into, scratch, commit, before)
+        if not source:
+            raise UsageError("No submission was named.")
         path = Path(source).expanduser()
         try:
             mode = path.stat().st_mode

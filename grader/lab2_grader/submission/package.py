@@ -16,6 +16,7 @@ from __future__ import annotations
 import difflib
 import hashlib
 import os
+import re
 import stat
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -229,9 +230,10 @@ def _no_package(found: Survey, wanted: str) -> RefusedError:
 
 
 def _is_near(name: str, wanted: str) -> bool:
-    """*name* was most likely meant to be *wanted*."""
+    """*name* was most likely meant to be *wanted*; that of another lab, with another number, was not."""
     plain = "".join(letter for letter in name.casefold() if letter.isalnum())
-    return wanted in plain or difflib.SequenceMatcher(None, plain, wanted).ratio() > 0.75
+    same_number = re.findall("[0-9]+", plain) == re.findall("[0-9]+", wanted)
+    return wanted in plain or (same_number and difflib.SequenceMatcher(None, plain, wanted).ratio() >= 0.75)
 
 
 def _below(folder: str, name: str) -> str:
