@@ -74,3 +74,21 @@ def note(key: str, **values: Value) -> str:
 def refusal(rule: str, **values: Value) -> RefusedError:
     """The refusal under *rule*."""
     return RefusedError(rule, fill(catalogue().refusal[rule].text, **values))
+
+
+def explanation(check: lab.RubricCheck) -> str:
+    """What *check* asks, how it is judged, what the ruling is where the worksheet is silent."""
+    from lab2_grader.checks.verdicts import known
+
+    texts = catalogue().check[check.id]
+    values = known(check.id)
+    return "\n".join(
+        (
+            f"{check.id}: {check.title}",
+            f"Worksheet section {check.section}; {check.points} points by default.",
+            "",
+            f"Asks:   {fill(texts.expected, **values)}",
+            f"Judged: {fill(texts.judged, **values)}",
+            f"Ruling: {fill(texts.ruling, **values)}",
+        )
+    )

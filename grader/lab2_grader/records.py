@@ -399,6 +399,13 @@ class Scene(Record):
     seconds: float
     events: tuple[Event, ...]
 
+    @property
+    def follows_own_clock(self) -> bool:
+        """Whether its nodes were found not to follow the ROS clock that the grader drove."""
+        return self.clock is Clock.TIME_LAPSE and any(
+            isinstance(event, Measured) and event.name == "follows_ros_clock" and event.value == 0 for event in self.events
+        )
+
 
 # --- evidence -----------------------------------------------------------------------------------
 

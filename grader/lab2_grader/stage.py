@@ -36,6 +36,7 @@ from lab2_grader.ros import Ros
 INSTALLED = f"{sandbox.WORKSPACE}/install"
 OBSERVER_OUTPUT_BYTES = 40_000_000
 OBSERVER_GRACE_SECONDS = 30.0
+EARLY_OBSERVERS = 3  # conversation, listener, originals: what a normal submission needs
 WORDS = ("amber", "birch", "cobalt", "delta", "ember", "fjord", "garnet", "heron", "indigo", "juniper", "kestrel", "lilac")
 
 # Runs a module's main without its entry point: for a package whose setup.py does not name it.
@@ -92,8 +93,9 @@ class _Observer:
 
     def dismiss(self) -> None:
         """End an observer; one that has played its scene does not mind."""
-        self._process.stop(EndedBy.GRADER)
-        self._process.wait()
+        if self._process.running:
+            self._process.stop(EndedBy.GRADER)
+            self._process.wait()
 
 
 class Stage:
@@ -123,15 +125,24 @@ class Stage:
         self._home = home
         self._clock = clock
         self._random = random.Random(seed)
-        self._waiting = [self._observer() for _ in range(3)]
+        self._observers: list[_Observer] = []
+        self._waiting = [self._observer() for _ in range(EARLY_OBSERVERS)]
 
     def _observer(self) -> _Observer:
-        return _Observer(self._ros, self._isolation, self._home)
+        observer = _Observer(self._ros, self._isolation, self._home)
+        self._observers.append(observer)
+        return observer
 
-    def close(self) -> None:
-        """Dismiss the observers that were not needed."""
-        while self._waiting:
-            self._waiting.pop().dismiss()
+    def __enter__(self) -> Stage:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._dismiss_all()
+
+    def _dismiss_all(self) -> None:
+        """End every observer, and with it whatever of the submission it had started."""
+        for observer in self._observers:
+            observer.dismiss()
 
     def play(self, build: Build, installed: Path) -> tuple[Scene, ...]:
         """Play every scene that this build allows, side by side.
@@ -155,7 +166,11 @@ class Stage:
         jobs.insert(0, lambda: self._conversation_and_talker(build, installed))
         with ThreadPoolExecutor(max_workers=len(jobs)) as pool:
             futures: list[Future[tuple[Scene, ...]]] = [pool.submit(job) for job in jobs]
-            scenes = [scene for future in futures for scene in future.result()]
+            try:
+                scenes = [scene for future in futures for scene in future.result()]
+            except BaseException:
+                self._dismiss_all()
+                raise
         order = list(SceneName)
         return tuple(sorted(scenes, key=lambda scene: order.index(scene.name)))
 

@@ -1,0 +1,65 @@
+"""Information without points: what is worth saying of a submission although no check asks for it."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from lab2_grader import messages
+from lab2_grader.checks.view import View
+from lab2_grader.records import Evidence, SceneName
+
+
+def notes(evidence: Evidence) -> tuple[str, ...]:
+    """The notes on *evidence*, a sentence each."""
+    view = View(evidence)
+    return (*evidence.faults, *_period(view), *_print(view), *_names(view), *_stand_ins(view), *_dropped(view))
+
+
+def _period(view: View) -> list[str]:
+    scene = view.talking
+    if scene is None or not view.numbers:
+        return []
+    found = []
+    if "period_seconds" in scene.measured:
+        found.append(messages.note("period", seconds=f"{scene.measured['period_seconds']:g}"))
+    if scene.scene.follows_own_clock:
+        found.append(messages.note("own-clock"))
+    return found
+
+
+def _print(view: View) -> list[str]:
+    """The logger writes to standard error, print() to standard output; told apart where nothing stands in between."""
+    scene = view.scene(SceneName.LISTENER)
+    if scene is None or not any(line.stream == "stdout" and line.text.strip() for line in scene.lines):
+        return []
+    return [messages.note("print", node=scene.scene.label)]
+
+
+def _names(view: View) -> list[str]:
+    scene = view.scene(SceneName.CONVERSATION)
+    if scene is None:
+        return []
+    running = {process.executable for process in scene.seen}
+    owners = Counter(
+        (endpoint.node, endpoint.topic, endpoint.kind) for endpoint in scene.endpoints if endpoint.event == "appeared"
+    )
+    nodes = {node for node, _, _ in owners}
+    if len(running) > 1 and len(nodes) == 1:
+        return [messages.note("same-name", node=nodes.pop())]
+    return []
+
+
+def _stand_ins(view: View) -> list[str]:
+    numeric = view.specification.numeric
+    wanted = {SceneName.TALKER: numeric.talker, SceneName.LISTENER: numeric.listener}
+    found = []
+    for name, program in wanted.items():
+        scene = view.scene(name)
+        if scene is not None and (scene.scene.started_with != "executable" or scene.scene.label != program):
+            found.append(messages.note("stand-in", name=program, used=f"the {scene.scene.started_with} {scene.scene.label}"))
+    return found
+
+
+def _dropped(view: View) -> list[str]:
+    dropped = sum(int(scene.measured.get("dropped_bytes", 0)) for scene in view.scenes())
+    return [messages.note("output", bytes=dropped)] if dropped else []

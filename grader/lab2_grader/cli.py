@@ -1,0 +1,173 @@
+"""The command line: arguments, exit codes, the one handler of exceptions. The only module that prints."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+
+from rich.console import Console
+from rich.live import Live
+from rich.spinner import Spinner
+from rich.text import Text
+
+from lab2_grader import __version__, lab, messages, pipeline, process, ros, sandbox
+from lab2_grader.errors import Lab2Error, RefusedError, UsageError
+from lab2_grader.records import Clock, Result
+from lab2_grader.report.terminal import terminal
+
+GRADED, BELOW, USAGE, NOT_GRADED, INTERRUPTED = 0, 1, 2, 3, 130
+LOG = "lab2-grader-fault.log"
+
+out = Console(highlight=False)
+err = Console(stderr=True, highlight=False)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code (DESIGN section 3)."""
+    process.become_reaper()
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        arguments = _parser().parse_args(argv)
+        code: int = arguments.run(arguments)
+        return code
+    except KeyboardInterrupt:
+        err.print("Interrupted. What was recorded so far is kept; nothing is left running.")
+        return INTERRUPTED
+    except RefusedError as error:
+        err.print(Text(f"Refused: {error}"))
+        return error.exit_code
+    except Lab2Error as error:
+        err.print(Text(str(error)))
+        return error.exit_code
+    except BrokenPipeError:
+        return NOT_GRADED
+    except Exception:
+        Path(LOG).write_text(f"lab2-grader {__version__}, Python {sys.version}\n\n{traceback.format_exc()}")
+        err.print(f"The grader itself failed; no mark was given. Send the file {LOG} to whoever maintains it.")
+        return NOT_GRADED
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="lab2-grader", description="Grades lab 2 by building, launching and listening.")
+    parser.add_argument("--version", action="version", version=f"lab2-grader {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    grade = commands.add_parser("grade", help="grade one submission")
+    grade.add_argument("submission", help="a folder, a .zip or .tar.gz, or the address of a git repository")
+    grade.add_argument("--out", type=Path, help="where the result goes (default: results/<name>)")
+    grade.add_argument("--rubric", type=Path, help="a rubric of your own")
+    grade.add_argument("--ros", choices=("auto", "sourced", "wheels"), default="auto", help="which ROS to use")
+    grade.add_argument("--clock", type=Clock, choices=list(Clock), default=Clock.TIME_LAPSE, help="how time is driven")
+    grade.add_argument("--isolation", choices=("auto", "off"), default="auto", help="off: run it with your own rights")
+    grade.add_argument("--fail-under", type=int, metavar="N", help="exit with 1 when the mark is below N")
+    grade.set_defaults(run=_grade)
+
+    rescore = commands.add_parser("rescore", help="judge recorded evidence again; needs no ROS")
+    rescore.add_argument("results", type=Path, help="a result's folder, or a folder of such folders")
+    rescore.add_argument("--rubric", type=Path, help="a rubric of your own")
+    rescore.set_defaults(run=_rescore)
+
+    explain = commands.add_parser("explain", help="what a check asks and how it is judged")
+    explain.add_argument("check", nargs="?", help="the id of a check; without one, all are listed")
+    explain.set_defaults(run=_explain)
+    return parser
+
+
+# --- commands -----------------------------------------------------------------------------------
+
+
+def _grade(arguments: argparse.Namespace) -> int:
+    means = pipeline.Means(ros.find(arguments.ros), _isolation(arguments), lab.rubric(arguments.rubric), arguments.clock)
+    if not means.isolation.on:
+        err.print(Text(sandbox.protections_off(means.isolation), style="bold yellow"))
+        if means.isolation.mend:
+            err.print(Text(f"To mend it: {means.isolation.mend}"))
+    destination = arguments.out or (lambda name: pipeline.results_folder(Path("results"), name))
+    with _Progress(arguments.submission) as progress:
+        result, folder = pipeline.grade(arguments.submission, destination, means, progress)
+    out.print(terminal(result))
+    out.print(Text(f"Reports and evidence: {folder}"))
+    return _exit_code(result, arguments.fail_under)
+
+
+def _isolation(arguments: argparse.Namespace) -> sandbox.Isolation:
+    if arguments.isolation == "off":
+        return sandbox.Isolation(False, "it was switched off")
+    return sandbox.probe()
+
+
+def _exit_code(result: Result, fail_under: int | None) -> int:
+    if not result.graded or result.score is None:
+        return NOT_GRADED
+    return BELOW if fail_under is not None and result.score < fail_under else GRADED
+
+
+def _rescore(arguments: argparse.Namespace) -> int:
+    rubric = lab.rubric(arguments.rubric)
+    root: Path = arguments.results
+    folders = sorted(path.parent for path in (*root.glob("evidence"), *root.glob("*/evidence")))
+    if not folders:
+        raise UsageError(f"There is no evidence in {root}. Give a folder that `lab2-grader grade` wrote.")
+    for folder in folders:
+        result = pipeline.rescore(folder, rubric)
+        pipeline.write_reports(folder, result)
+        out.print(Text(f"{folder.name}: {result.score if result.graded else 'withheld'} of {result.max_score}"))
+    return GRADED
+
+
+def _explain(arguments: argparse.Namespace) -> int:
+    checks = {check.id: check for check in lab.rubric().check}
+    if arguments.check is None:
+        for check in checks.values():
+            out.print(Text(f"{check.id:20} {check.points:3} points  {check.title}"))
+        return GRADED
+    if arguments.check not in checks:
+        raise UsageError(f"There is no check {arguments.check}. There are: {', '.join(checks)}.")
+    out.print(Text(messages.explanation(checks[arguments.check])))
+    return GRADED
+
+
+# --- progress -----------------------------------------------------------------------------------
+
+
+class _Progress:
+    """One line that says what is being done and for how long; plain lines when not on a terminal."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._began = time.monotonic()
+        self._spinner = Spinner("dots")
+        self._live = Live(self, console=err, transient=True, refresh_per_second=8) if err.is_terminal else None
+        self._doing = ""
+
+    def __rich__(self) -> Spinner:
+        self._spinner.update(text=Text(f"{self._doing} … {time.monotonic() - self._began:.1f} s"))
+        return self._spinner
+
+    def __call__(self, doing: str) -> None:
+        self._doing = doing
+        if self._live is None:
+            err.print(Text(f"[{time.monotonic() - self._began:5.1f} s] {doing}"))
+
+    def __enter__(self) -> _Progress:
+        if self._live is not None:
+            self._live.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
