@@ -167,7 +167,3 @@ class _Progress:
     def __exit__(self, *exception: object) -> None:
         if self._live is not None:
             self._live.stop()
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -51,7 +51,8 @@ class Observer:
     Args:
         recorder: Where everything observed goes.
 
-    What a scene's script needs to decide what to do next is kept here too: `messages`, `lines`, `endpoints`.
+    What a scene's script needs to decide what to do next is kept here too: `messages`, `lines`, `endpoints`,
+    `ended_executables`.
     """
 
     def __init__(self, recorder: Recorder) -> None:
@@ -73,6 +74,7 @@ class Observer:
         self._program: process.Process | None = None
         self._splitters: dict[str, OutputLines] = {}
         self._processes: dict[int, str] = {}
+        self.ended_executables: frozenset[str] = frozenset()
         self._next_graph = 0.0
         self._next_processes = 0.0
         self._stopping = False
@@ -139,7 +141,8 @@ class Observer:
                     command = clean(" ".join(info.command), 500)
                     self.recorder.write(ProcessSeen(self.recorder.now(), pid, clean(executable, 100), command))
         for pid in [pid for pid in self._processes if pid not in found]:
-            if self._processes.pop(pid):
+            if executable := self._processes.pop(pid):
+                self.ended_executables |= {executable}
                 by = EndedBy.GRADER if self._stopping else EndedBy.ITSELF
                 self.recorder.write(ProcessGone(self.recorder.now(), pid, by))
 

@@ -97,7 +97,7 @@ def _conversation(observer: Observer, plan: ScenePlan) -> None:
     topics = (specification.number_topic, specification.text_topic)
     for topic in topics:
         observer.listen(topic.name, topic.type)
-    steps = LockStep(observer, plan.clock)
+    steps = LockStep(observer, plan.clock, specification.numeric.talker)
     wanted = frozenset((kind, topic.name) for kind in ("publisher", "subscription") for topic in topics)
     _start(observer, plan, wanted)
     if plan.clock is Clock.TIME_LAPSE:
@@ -121,7 +121,7 @@ def _talker(observer: Observer, plan: ScenePlan) -> None:
     topics = (specification.number_topic, specification.text_topic)
     for topic in topics:
         observer.listen(topic.name, topic.type)
-    steps = LockStep(observer, plan.clock)
+    steps = LockStep(observer, plan.clock, plan.label)
     _start(observer, plan, frozenset(("publisher", topic.name) for topic in topics))
     if plan.clock is Clock.TIME_LAPSE:
         observer.until(lambda: steps.followers() >= 1, lab.limits().start.settle_seconds)
