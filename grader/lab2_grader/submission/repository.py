@@ -79,7 +79,10 @@ _UNREACHABLE = re.compile(
     "couldn't connect|temporary failure|operation timed out|certificate|ssl connection|gnutls|proxy",
     re.IGNORECASE,
 )
-_TOO_LARGE = re.compile("file too large|signal 25", re.IGNORECASE)
+# `index-pack` is killed silently by the limit on the size of a file; over a broken pack it would say why before.
+_TOO_LARGE = re.compile(
+    r"file too large|signal 25|\A(?:warning:.*\n)*fatal: fetch-pack: invalid index-pack output\s*\Z", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True)
@@ -398,11 +401,10 @@ def _is_same(file: Path, blob: Blob) -> bool:
 
 def _not_ignored(git: _Git, top: Path, package_path: str) -> frozenset[str]:
     """The files of the package that no `.gitignore` hides; a repository inside is a name with a slash at its end."""
+    within = () if package_path == "." else ("--", f":(top,literal){package_path}")
     listing = git.run(
-        "ls-files", "--others", "--exclude-standard", "-z", "--", f":(top,literal){package_path}",
-        keep=_LISTING_BYTES,
-        work_tree=top.resolve(),
-    )  # fmt: skip
+        "ls-files", "--others", "--exclude-standard", "-z", *within, keep=_LISTING_BYTES, work_tree=top.resolve()
+    )
     return frozenset(_text(listing.stdout).split("\0"))
 
 
