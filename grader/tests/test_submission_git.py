@@ -729,10 +729,11 @@ def test_a_clone_that_is_too_large(tmp_path: Path, smart_web: str, monkeypatch: 
 
 def test_a_clone_that_fails(tmp_path: Path, smart_web: str, web: str) -> None:
     refusal = refused(f"{smart_web}/nothing.git", tmp_path / "out")
-    assert refusal.rule == "clone-failed" and "not found" in str(refusal)
+    assert refusal.rule == "repository-not-found" and f"{smart_web}/nothing.git" in str(refusal)
     git(tmp_path, "init", "--quiet", "--bare", "empty.git")
     assert refused(f"{smart_web}/empty.git", tmp_path / "out").rule == "repository-empty"
-    assert refused(f"{web}/", tmp_path / "out").rule == "clone-failed"
+    write(tmp_path, {"page/info/refs": "<html>", "page/HEAD": "<html>"})
+    assert refused(f"{web}/page", tmp_path / "out").rule == "clone-failed"
 
 
 def test_an_address_that_cannot_be_reached_is_not_the_students_fault(tmp_path: Path) -> None:
