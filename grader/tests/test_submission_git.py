@@ -732,7 +732,7 @@ def test_a_clone_that_fails(tmp_path: Path, smart_web: str, web: str) -> None:
     assert refusal.rule == "repository-not-found" and f"{smart_web}/nothing.git" in str(refusal)
     git(tmp_path, "init", "--quiet", "--bare", "empty.git")
     assert refused(f"{smart_web}/empty.git", tmp_path / "out").rule == "repository-empty"
-    write(tmp_path, {"page/info/refs": "<html>", "page/HEAD": "<html>"})
+    write(tmp_path, {"page/info/refs": f"{40 * 'a'}\trefs/heads/main\n", "page/HEAD": "ref: refs/heads/main\n"})
     assert refused(f"{web}/page", tmp_path / "out").rule == "clone-failed"
 
 
