@@ -146,10 +146,7 @@ def generate_launch_description():
     Case(
         "same-name-twice",
         "talker(name='n', namespace='/'), talker(name='n', namespace='/')",
-        (
-            "[WARNING] [numeric_talker-2]: there are now at least 2 nodes with the name /n "
-            "created within this launch context",
-        ),
+        ("[WARNING] [numeric_talker-2]: there are now at least 2 nodes with the name /n created within this launch",),
     ),
     Case(
         "environment",
@@ -273,8 +270,7 @@ def generate_launch_description():
         "argument-not-a-choice",
         "DeclareLaunchArgument('a', default_value='x', choices=['x', 'y']), say('no')",
         (
-            '[ERROR] [launch.actions.declare_launch_argument]: Argument "a" provided value "z" is not valid. '
-            "Valid options are: ['x', 'y']",
+            '[ERROR] [launch.actions.declare_launch_argument]: Argument "a" provided value "z" is not valid. Valid options',
         ),
         1,
         arguments=("a:=z",),

