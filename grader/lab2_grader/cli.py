@@ -16,7 +16,8 @@ from rich.live import Live
 from rich.spinner import Spinner
 from rich.text import Text
 
-from lab2_grader import __version__, lab, messages, pipeline, process, ros, sandbox
+from lab2_grader import __version__, lab, pipeline, process, ros, sandbox
+from lab2_grader.checks import verdicts
 from lab2_grader.errors import Lab2Error, RefusedError, UsageError
 from lab2_grader.records import Clock, Result
 from lab2_grader.report.terminal import terminal
@@ -34,8 +35,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, _interrupt)
     try:
         arguments = _parser().parse_args(argv)
-        code: int = arguments.run(arguments)
-        return code
+        return int(arguments.run(arguments))
     except KeyboardInterrupt:
         err.print("Interrupted. What was recorded so far is kept; nothing is left running.")
         return INTERRUPTED
@@ -53,12 +53,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         return NOT_GRADED
 
 
-def _interrupt(number: int, frame: FrameType | None) -> None:
+def _interrupt(_number: int, _frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="lab2-grader", description="Grades lab 2 by building, launching and listening.")
+    parser = argparse.ArgumentParser(
+        prog="lab2-grader", description="Grades lab 2 by building, launching and listening."
+    )
     parser.add_argument("--version", action="version", version=f"lab2-grader {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
@@ -87,7 +89,9 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _grade(arguments: argparse.Namespace) -> int:
-    means = pipeline.Means(ros.find(arguments.ros), _isolation(arguments), lab.rubric(arguments.rubric), arguments.clock)
+    means = pipeline.Means(
+        ros.find(arguments.ros), _isolation(arguments), lab.rubric(arguments.rubric), arguments.clock
+    )
     if not means.isolation.on:
         err.print(Text(sandbox.protections_off(means.isolation), style="bold yellow"))
         if means.isolation.mend:
@@ -133,7 +137,7 @@ def _explain(arguments: argparse.Namespace) -> int:
         return GRADED
     if arguments.check not in checks:
         raise UsageError(f"There is no check {arguments.check}. There are: {', '.join(checks)}.")
-    out.print(Text(messages.explanation(checks[arguments.check])))
+    out.print(Text(verdicts.explanation(checks[arguments.check])))
     return GRADED
 
 

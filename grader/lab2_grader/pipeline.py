@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -23,7 +22,7 @@ EVIDENCE = "evidence"
 Progress = Callable[[str], None]
 
 
-class Means(Record):
+class Means(Record, frozen=True):
     """With what submissions are graded.
 
     Args:
@@ -124,7 +123,9 @@ class _Recorder:
         stopped = (*self._faults, messages.status("interrupted", stage=name))
         partial = self._evidence(stopped)
         result = score(partial, checks.judge(partial), self._means.rubric, "")
-        evidence.write_atomically(self._folder / report.RESULT, evidence.pretty(msgspec.structs.replace(result, graded=False, score=None)))
+        evidence.write_atomically(
+            self._folder / report.RESULT, evidence.pretty(msgspec.structs.replace(result, graded=False, score=None))
+        )
 
     def built(self, built: Build) -> None:
         """The build has ended."""
@@ -164,4 +165,4 @@ class _Recorder:
 
 def results_folder(results: Path, name: str) -> Path:
     """Where the result of the submission *name* goes below *results*."""
-    return results / (os.path.basename(name) or "submission")
+    return results / (Path(name).name or "submission")

@@ -76,9 +76,9 @@ def _stat(pid: int) -> tuple[int, int, int] | None:
 def _descendants(root: int) -> dict[int, tuple[int, int, int]]:
     """*root* and all its living descendants, with what `_stat` says of each."""
     table: dict[int, tuple[int, int, int]] = {}
-    for name in os.listdir("/proc"):
-        if name.isdigit() and (found := _stat(int(name))) is not None:
-            table[int(name)] = found
+    for entry in os.scandir("/proc"):
+        if entry.name.isdigit() and (found := _stat(int(entry.name))) is not None:
+            table[int(entry.name)] = found
     children: dict[int, list[int]] = {}
     for pid, (parent, _, _) in table.items():
         children.setdefault(parent, []).append(pid)
@@ -180,7 +180,8 @@ class Process:
     # --- the pump ---------------------------------------------------------------------------
 
     def _run(self) -> None:
-        assert self._popen.stdout is not None and self._popen.stderr is not None
+        assert self._popen.stdout is not None
+        assert self._popen.stderr is not None
         deadline = self._began + self._limits.seconds
         watched = bool(self._limits.processes or self._limits.memory_bytes)
         next_watch = self._began + POLL_SECONDS

@@ -34,7 +34,7 @@ SYSTEM_FILES = (
 )
 
 
-class Isolation(Record):
+class Isolation(Record, frozen=True):
     """Whether submissions are isolated; `reason` says why not, `mend` which command changes that."""
 
     on: bool
@@ -47,7 +47,7 @@ class Isolation(Record):
         return "bubblewrap" if self.on else "off"
 
 
-class Mount(Record):
+class Mount(Record, frozen=True):
     """A host path shown read-only inside; `inside` is empty when it is shown under its own name."""
 
     host: str
@@ -116,9 +116,9 @@ def confine(
     if workspace_bytes:
         argv += ["--size", str(workspace_bytes), "--tmpfs", WORKSPACE]
     for name in ("/bin", "/sbin", "/lib", "/lib32", "/lib64"):
-        if os.path.islink(name):
-            argv += ["--symlink", os.readlink(name), name]
-        elif os.path.isdir(name):
+        if Path(name).is_symlink():
+            argv += ["--symlink", str(Path(name).readlink()), name]
+        elif Path(name).is_dir():
             argv += ["--ro-bind", name, name]
     for name in SYSTEM_FILES:
         argv += ["--ro-bind-try", name, name]

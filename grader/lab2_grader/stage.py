@@ -37,7 +37,20 @@ INSTALLED = f"{sandbox.WORKSPACE}/install"
 OBSERVER_OUTPUT_BYTES = 40_000_000
 OBSERVER_GRACE_SECONDS = 30.0
 EARLY_OBSERVERS = 3  # conversation, listener, originals: what a normal submission needs
-WORDS = ("amber", "birch", "cobalt", "delta", "ember", "fjord", "garnet", "heron", "indigo", "juniper", "kestrel", "lilac")
+WORDS = (
+    "amber",
+    "birch",
+    "cobalt",
+    "delta",
+    "ember",
+    "fjord",
+    "garnet",
+    "heron",
+    "indigo",
+    "juniper",
+    "kestrel",
+    "lilac",
+)
 
 # Runs a module's main without its entry point: for a package whose setup.py does not name it.
 RUN_MODULE = (
@@ -61,7 +74,7 @@ class _Observer:
         conversation = lab.limits().conversation
         seconds = conversation.realtime_seconds + conversation.timelapse_seconds + OBSERVER_GRACE_SECONDS
         request = Request(
-            argv=(sys.executable, "-P", "-m", "lab2_grader.observe"),
+            argv=(sys.executable, "-m", "lab2_grader.observe"),
             env=tuple(environment.items()),
             cwd="/",
             limits=Limits(seconds=seconds, output_bytes=OBSERVER_OUTPUT_BYTES),
@@ -124,7 +137,7 @@ class Stage:
         self._writer = writer
         self._home = home
         self._clock = clock
-        self._random = random.Random(seed)
+        self._random = random.Random(seed)  # noqa: S311 - numbers to look for, no secrets
         self._observers: list[_Observer] = []
         self._waiting = [self._observer() for _ in range(EARLY_OBSERVERS)]
 
@@ -249,7 +262,10 @@ class Stage:
         conversation, resources = lab.limits().conversation, lab.limits().resources
         seconds = conversation.realtime_seconds + conversation.timelapse_seconds
         request = Request(
-            argv=argv, env=self._ros.environment(home, self._prefix(installed)), cwd=home, limits=resources.limits(seconds)
+            argv=argv,
+            env=self._ros.environment(home, self._prefix(installed)),
+            cwd=home,
+            limits=resources.limits(seconds),
         )
         mounts = (
             sandbox.Mount(str(installed / "install"), INSTALLED),
@@ -283,7 +299,9 @@ def _shows_talker(scene: Scene) -> bool:
     speakers = [
         (event.node, event.topic)
         for event in scene.events
-        if isinstance(event, Endpoint) and event.event == "appeared" and event.kind == "publisher"
+        if isinstance(event, Endpoint)
+        and event.event == "appeared"
+        and event.kind == "publisher"
         and event.topic in topics
     ]
     heard = any(isinstance(event, Message) and event.topic == topics[0] for event in scene.events)

@@ -29,7 +29,7 @@ Entry = tuple[str, bytes]
 
 def package_entries(prefix: str = "") -> list[Entry]:
     """The members of an archive that holds a package."""
-    content = {name: b"pass\n" for name in PACKAGE_FILES} | {"package.xml": b"<package><name>lab2</name></package>"}
+    content = dict.fromkeys(PACKAGE_FILES, b"pass\n") | {"package.xml": b"<package><name>lab2</name></package>"}
     return [(prefix + name, data) for name, data in sorted(content.items())]
 
 

@@ -173,10 +173,7 @@ class LockStep:
 
     def _stands_still(self, seconds: float) -> bool:
         """Whether nothing comes for *seconds* while the clock does not move; a few late messages are let pass."""
-        for _ in range(UNASKED_LIMIT):
-            if not self._wait(len(self._heard()), seconds):
-                return True
-        return False
+        return any(not self._wait(len(self._heard()), seconds) for _ in range(UNASKED_LIMIT))
 
     def _begin_real_time(self) -> None:
         self._phase("real-time")

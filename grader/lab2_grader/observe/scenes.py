@@ -9,7 +9,7 @@ from lab2_grader import lab
 from lab2_grader.observe.clock import LockStep
 from lab2_grader.observe.observer import Observer
 from lab2_grader.reading import numbers_in, said
-from lab2_grader.records import Clock, Measured, Message, Phase, ScenePlan, SceneName, Sent
+from lab2_grader.records import Clock, Measured, Message, Phase, SceneName, ScenePlan, Sent
 
 NO_PROCESS_SECONDS = 8.0  # a launch that has started none of the package's executables by then will not
 WARM_UP_TRIES = 4
@@ -41,6 +41,8 @@ def _start(observer: Observer, plan: ScenePlan, wanted: frozenset[tuple[str, str
     """Start the program and wait until the graph has every endpoint of *wanted*, or will not get any further.
 
     Args:
+        observer: Watches.
+        plan: What is to be started.
         wanted: (kind, topic) of the endpoints that a complete graph has.
     """
     limits = lab.limits().start
