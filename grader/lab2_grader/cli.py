@@ -23,10 +23,11 @@ from lab2_grader.records import Clock, Result
 from lab2_grader.report.terminal import terminal
 
 GRADED, BELOW, USAGE, NOT_GRADED, INTERRUPTED = 0, 1, 2, 3, 130
+PLAIN_WIDTH = 110  # columns when the output is no terminal
 LOG = "lab2-grader-fault.log"
 
-out = Console(highlight=False)
-err = Console(stderr=True, highlight=False)
+out = Console(highlight=False, width=None if sys.stdout.isatty() else PLAIN_WIDTH)
+err = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
