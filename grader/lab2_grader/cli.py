@@ -134,11 +134,11 @@ def _explain(arguments: argparse.Namespace) -> int:
     checks = {check.id: check for check in lab.rubric().check}
     if arguments.check is None:
         for check in checks.values():
-            out.print(Text(f"{check.id:20} {check.points:3} points  {check.title}"))
+            out.print(Text(f"{check.id:20} {check.points:3} points  {check.title}"), soft_wrap=True)
         return GRADED
     if arguments.check not in checks:
         raise UsageError(f"There is no check {arguments.check}. There are: {', '.join(checks)}.")
-    out.print(Text(verdicts.explanation(checks[arguments.check])))
+    out.print(Text(verdicts.explanation(checks[arguments.check])), soft_wrap=True)
     return GRADED
 
 

@@ -21,6 +21,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 from lab2_grader import lab
 from lab2_grader.errors import FaultError
@@ -50,19 +51,27 @@ def environment(*names: str) -> tuple[tuple[str, str], ...]:
 
 
 class ProcessInfo:
-    """A line of the process table: `pid`, `parent`, `command` (its arguments) and `resident_bytes`."""
+    """A line of the process table: `pid`, `command` (its arguments), and whether it wants the processor (`busy`)."""
 
-    __slots__ = ("command", "parent", "pid", "resident_bytes")
+    __slots__ = ("busy", "command", "pid")
 
-    def __init__(self, pid: int, parent: int, command: tuple[str, ...], resident_bytes: int) -> None:
+    def __init__(self, pid: int, command: tuple[str, ...], busy: bool) -> None:
         self.pid = pid
-        self.parent = parent
         self.command = command
-        self.resident_bytes = resident_bytes
+        self.busy = busy
 
 
-def _stat(pid: int) -> tuple[int, int, int] | None:
-    """(parent, threads, resident bytes) of *pid*, or None when it is gone or a zombie."""
+class _Stat(NamedTuple):
+    """What `/proc/<pid>/stat` says of a living process (proc(5))."""
+
+    parent: int
+    threads: int
+    resident_bytes: int
+    busy: bool
+
+
+def _stat(pid: int) -> _Stat | None:
+    """What the kernel says of *pid*, or None when it is gone or a zombie."""
     try:
         text = Path(f"/proc/{pid}/stat").read_bytes()
     except OSError:
@@ -70,19 +79,19 @@ def _stat(pid: int) -> tuple[int, int, int] | None:
     fields = text[text.rindex(b")") + 2 :].split()
     if fields[0] in (b"Z", b"X"):
         return None
-    return int(fields[1]), int(fields[17]), int(fields[21]) * PAGE_BYTES
+    return _Stat(int(fields[1]), int(fields[17]), int(fields[21]) * PAGE_BYTES, fields[0] in (b"R", b"D"))
 
 
-def _descendants(root: int) -> dict[int, tuple[int, int, int]]:
+def _descendants(root: int) -> dict[int, _Stat]:
     """*root* and all its living descendants, with what `_stat` says of each."""
-    table: dict[int, tuple[int, int, int]] = {}
+    table: dict[int, _Stat] = {}
     for entry in os.scandir("/proc"):
         if entry.name.isdigit() and (found := _stat(int(entry.name))) is not None:
             table[int(entry.name)] = found
     children: dict[int, list[int]] = {}
-    for pid, (parent, _, _) in table.items():
-        children.setdefault(parent, []).append(pid)
-    tree: dict[int, tuple[int, int, int]] = {}
+    for pid, stat in table.items():
+        children.setdefault(stat.parent, []).append(pid)
+    tree: dict[int, _Stat] = {}
     pending = [root]
     while pending:
         pid = pending.pop()
@@ -95,13 +104,13 @@ def _descendants(root: int) -> dict[int, tuple[int, int, int]]:
 def tree(root: int) -> tuple[ProcessInfo, ...]:
     """The living processes below and including *root*, by pid, each with its arguments."""
     found = []
-    for pid, (parent, _, resident) in sorted(_descendants(root).items()):
+    for pid, stat in sorted(_descendants(root).items()):
         try:
             raw = Path(f"/proc/{pid}/cmdline").read_bytes()
         except OSError:
             continue
         command = tuple(part.decode(errors="replace") for part in raw.rstrip(b"\0").split(b"\0"))
-        found.append(ProcessInfo(pid, parent, command, resident))
+        found.append(ProcessInfo(pid, command, stat.busy))
     return tuple(found)
 
 
@@ -259,9 +268,9 @@ class Process:
     def _watch(self) -> None:
         """Strike when the whole tree uses more processes (threads count) or memory than it may."""
         found = _descendants(self.pid).values()
-        if self._limits.processes and sum(threads for _, threads, _ in found) > self._limits.processes:
+        if self._limits.processes and sum(stat.threads for stat in found) > self._limits.processes:
             self._strike("processes")
-        elif self._limits.memory_bytes and sum(size for _, _, size in found) > self._limits.memory_bytes:
+        elif self._limits.memory_bytes and sum(stat.resident_bytes for stat in found) > self._limits.memory_bytes:
             self._strike("memory")
 
     def _strike(self, limit: str) -> None:

@@ -38,9 +38,7 @@ def test_a_grade_says_the_mark_and_leaves_a_whole_result(tmp_path: Path) -> None
 
 @pytest.mark.parametrize(("mark", "code"), [(92, 0), (93, 1)])
 def test_fail_under_turns_a_low_mark_into_an_exit_code(tmp_path: Path, mark: int, code: int) -> None:
-    done = run(
-        "grade", str(ROOT / "solution"), "--out", str(tmp_path / "out"), "--fail-under", str(mark), cwd=tmp_path
-    )
+    done = run("grade", str(ROOT / "solution"), "--out", str(tmp_path / "out"), "--fail-under", str(mark), cwd=tmp_path)
 
     assert done.returncode == code, done.stderr
 
