@@ -89,8 +89,8 @@ def limited(monkeypatch: pytest.MonkeyPatch, **values: float) -> Iterator[None]:
         yield
 
 
-def git(folder: Path, *arguments: str, when: str = "2026-10-05T12:00:00+0000") -> str:
-    """Run git in *folder* as a student would."""
+def git(folder: Path, *arguments: str, when: str = "2026-10-05T12:00:00+0000", text: str = "") -> str:
+    """Run git in *folder* as a student would; *text* is its standard input."""
     environment = {
         "PATH": os.environ["PATH"],
         "HOME": str(folder),
@@ -102,7 +102,10 @@ def git(folder: Path, *arguments: str, when: str = "2026-10-05T12:00:00+0000") -
         "GIT_AUTHOR_DATE": when,
         "GIT_COMMITTER_DATE": when,
     }
-    done = subprocess.run(["git", *arguments], cwd=folder, env=environment, check=False, capture_output=True, text=True)
+    command = ["git", *arguments]
+    done = subprocess.run(
+        command, cwd=folder, env=environment, input=text, check=False, capture_output=True, encoding="utf-8"
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 

@@ -573,11 +573,9 @@ def test_a_tree_that_holds_itself_a_thousandfold_is_refused(tmp_path: Path, monk
     repository = tmp_path / "in"
     write(repository, {"x": "x"})
     blob = git(repository, "hash-object", "-w", "x")
-    listing_file = repository / "tree"
     entry = f"100644 blob {blob}"
     for _ in range(9):
-        listing_file.write_text("".join(f"{entry}\tf{number}\n" for number in range(10)))
-        tree = os.popen(f"cd {repository} && git mktree < tree").read().strip()
+        tree = git(repository, "mktree", text="".join(f"{entry}\tf{number}\n" for number in range(10)))
         entry = f"040000 tree {tree}"
     git(repository, "update-ref", "refs/heads/main", git(repository, "commit-tree", tree, "-m", "bomb"))
     git(repository, "symbolic-ref", "HEAD", "refs/heads/main")
@@ -593,9 +591,8 @@ def test_hostile_paths_in_a_commit(tmp_path: Path) -> None:
     write(repository, {"x": "x", "package.xml": "<package><name>lab2</name></package>"})
     blob, manifest = (git(repository, "hash-object", "-w", name) for name in ("x", "package.xml"))
     for name in ("..", ".git"):
-        inner = os.popen(f"cd {repository} && printf '100644 blob {blob}\\tx\\n' | git mktree").read().strip()
-        lines = f"100644 blob {manifest}\\tpackage.xml\\n040000 tree {inner}\\t{name}\\n"
-        tree = os.popen(f"cd {repository} && printf '{lines}' | git mktree").read().strip()
+        inner = git(repository, "mktree", text=f"100644 blob {blob}\tx\n")
+        tree = git(repository, "mktree", text=f"100644 blob {manifest}\tpackage.xml\n040000 tree {inner}\t{name}\n")
         assert tree
         git(repository, "update-ref", "refs/heads/main", git(repository, "commit-tree", tree, "-m", "x"))
         git(repository, "symbolic-ref", "HEAD", "refs/heads/main")
