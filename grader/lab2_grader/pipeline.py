@@ -12,7 +12,18 @@ from lab2_grader import __version__, checks, evidence, messages, process, report
 from lab2_grader.build import build
 from lab2_grader.errors import FaultError
 from lab2_grader.lab import Rubric
-from lab2_grader.records import Build, Clock, Evidence, Record, Result, Runtime, Scene, Seconds, SubmissionFacts
+from lab2_grader.records import (
+    Build,
+    Clock,
+    Evidence,
+    Record,
+    Result,
+    Runtime,
+    Scene,
+    Seconds,
+    Submission,
+    SubmissionFacts,
+)
 from lab2_grader.ros import Ros
 from lab2_grader.score import score
 from lab2_grader.stage import Stage, entry
@@ -65,22 +76,41 @@ def grade(source: str, out: Path | Callable[[str], Path], means: Means, progress
         progress("taking the submission over")
         taken = submission.take(source, scratch / "package")
         folder = out(taken.facts.name) if callable(out) else out
-        record = _Recorder(folder, means, taken.facts, began)
-        try:
-            (scratch / "build").mkdir()
-            with Stage(means.ros, means.isolation, record.writer, scratch, means.clock) as stage:
-                record.stage("build")
-                progress("building with colcon")
-                built = build(taken, scratch / "build", means.ros, means.isolation)
-                record.built(built)
-                if built.ok:
-                    record.stage("scenes")
-                    progress("launching, listening, talking")
-                    record.played(stage.play(built, scratch / "build"))
-        except FaultError as fault:
-            record.failed(fault)
-        progress("judging")
-        return record.finish(), folder
+        return grade_taken(taken, scratch, folder, means, progress, began), folder
+
+
+def grade_taken(
+    taken: Submission, scratch: Path, folder: Path, means: Means, progress: Progress, began: float | None = None
+) -> Result:
+    """Grade a submission that was taken over already.
+
+    Args:
+        taken: The package and what is known of it.
+        scratch: A private folder, to be removed by the caller.
+        folder: Where the result goes.
+        means: With what.
+        progress: Told in a few words what begins.
+        began: When the work on it began, on the monotonic clock; None for now.
+
+    Raises:
+        OSError: The folder for the result cannot be written.
+    """
+    record = _Recorder(folder, means, taken.facts, time.monotonic() if began is None else began)
+    try:
+        (scratch / "build").mkdir()
+        with Stage(means.ros, means.isolation, record.writer, scratch, means.clock) as stage:
+            record.stage("build")
+            progress("building with colcon")
+            built = build(taken, scratch / "build", means.ros, means.isolation)
+            record.built(built)
+            if built.ok:
+                record.stage("scenes")
+                progress("launching, listening, talking")
+                record.played(stage.play(built, scratch / "build"))
+    except FaultError as fault:
+        record.failed(fault)
+    progress("judging")
+    return record.finish()
 
 
 def rescore(folder: Path, rubric: Rubric) -> Result:
