@@ -138,6 +138,7 @@ class ResourceLimits(Record, frozen=True):
 
     processes: int
     memory_bytes: int
+    cpu_seconds: float
     file_bytes: int
     scratch_bytes: int
     output_bytes: int
@@ -151,6 +152,7 @@ class ResourceLimits(Record, frozen=True):
             processes=self.processes,
             memory_bytes=self.memory_bytes,
             file_bytes=self.file_bytes,
+            cpu_seconds=self.cpu_seconds,
         )
 
 

@@ -32,10 +32,11 @@ class Limits(Record, frozen=True):
 
     Args:
         seconds: Wall-clock time before it is stopped.
-        output_bytes: How much of its output is kept, both streams together.
+        output_bytes: How much of each of its two streams of output is kept.
         processes: Processes and threads at once; 0 for no limit.
         memory_bytes: Resident memory of all together; 0 for no limit.
         file_bytes: Size of any one file it writes; 0 for no limit.
+        cpu_seconds: Time on processors of all together; 0 for no limit.
     """
 
     seconds: float
@@ -43,6 +44,7 @@ class Limits(Record, frozen=True):
     processes: int = 0
     memory_bytes: int = 0
     file_bytes: int = 0
+    cpu_seconds: float = 0
 
 
 class Request(Record, frozen=True):
@@ -77,7 +79,7 @@ class Outcome(Record, frozen=True):
         code: Exit code; None when a signal ended it.
         signal: Number of the signal that ended it; None when it exited.
         ended_by: Who ended it.
-        limit: Which limit was struck (`memory`, `processes`, …) when `ended_by` is LIMIT, else empty.
+        limit: Which limit was struck (`seconds`, `memory`, `processes`, `cpu`) when `ended_by` is LIMIT, else empty.
         stdout: What was kept of standard output.
         stderr: What was kept of standard error.
         dropped_bytes: Output beyond the limit, thrown away.
