@@ -1,0 +1,1 @@
+"""Pure renderers of what was found, for people and for other programs."""
