@@ -27,7 +27,7 @@ PREFIX = "lab2-"
 ENTER = 'n=$1; shift; while [ "$n" -gt 0 ]; do echo $$ > "$1/cgroup.procs" || exit 125; shift; n=$((n-1)); done; exec "$@"'
 
 
-class Base(Record):
+class Base(Record, frozen=True):
     """Where groups can be made.
 
     Args:

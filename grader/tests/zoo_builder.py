@@ -116,8 +116,8 @@ class Animal(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def statuses(self) -> dict[str, str]:
         """The expected status of each check; for a folder, git is not assessed."""
         expected = {check: "not-assessed" if check in GIT_CHECKS else "pass" for check in CHECKS}
-        expected |= {check: "fail" for check in self.fails}
-        return expected | {check: "blocked" for check in self.blocked}
+        expected |= dict.fromkeys(self.fails, "fail")
+        return expected | dict.fromkeys(self.blocked, "blocked")
 
     def build(self, folder: Path) -> Path:
         """Make the submission in the empty *folder*, and return it."""
