@@ -61,6 +61,7 @@ class Manifest(Record):
     seconds: Seconds
     faults: tuple[str, ...]
     scenes: tuple[SceneEntry, ...]
+    began: str = ""
 
 
 class _Version(msgspec.Struct, frozen=True):
@@ -110,10 +111,16 @@ class Writer:
         return self.folder / f"{name.value}.jsonl"
 
     def manifest(
-        self, runtime: Runtime, seconds: Seconds, faults: tuple[str, ...], scenes: tuple[SceneEntry, ...], finished: bool
+        self,
+        runtime: Runtime,
+        seconds: Seconds,
+        faults: tuple[str, ...],
+        scenes: tuple[SceneEntry, ...],
+        finished: bool,
+        began: str = "",
     ) -> None:
         """Record how far the run has come."""
-        manifest = Manifest(EVIDENCE_SCHEMA, finished, runtime, seconds, faults, scenes)
+        manifest = Manifest(EVIDENCE_SCHEMA, finished, runtime, seconds, faults, scenes, began)
         write_atomically(self.folder / MANIFEST, pretty(manifest))
 
 
@@ -147,7 +154,7 @@ def read(folder: Path) -> Evidence:
     build_path = folder / BUILD
     build = _decode(build_path, _bytes(build_path), Build) if build_path.exists() or manifest.scenes else None
     scenes = tuple(_scene(folder, entry) for entry in manifest.scenes)
-    return Evidence(facts, build, scenes, manifest.runtime, manifest.faults, manifest.seconds)
+    return Evidence(facts, build, scenes, manifest.runtime, manifest.faults, manifest.seconds, manifest.began)
 
 
 def digest(folder: Path) -> str:

@@ -115,6 +115,7 @@ class GitFacts(Record):
         pushed: HEAD is on a branch of a remote, as far as the repository knows.
         products: Committed build products and caches, at most 20.
         products_count: How many there are in all.
+        committed: When that commit was made, ISO 8601 with its time zone; empty when unknown.
     """
 
     commit: str | None
@@ -124,6 +125,7 @@ class GitFacts(Record):
     pushed: bool
     products: tuple[str, ...]
     products_count: int
+    committed: str = ""
 
 
 class SubmissionFacts(Record):
@@ -446,6 +448,7 @@ class Evidence(Record):
         runtime: With what.
         faults: What of ours failed outside a scene, a sentence each.
         seconds: How long it took.
+        began: When grading began, ISO 8601 in UTC.
     """
 
     submission: SubmissionFacts
@@ -454,6 +457,7 @@ class Evidence(Record):
     runtime: Runtime
     faults: tuple[str, ...]
     seconds: Seconds
+    began: str = ""
 
     def scene(self, name: SceneName) -> Scene | None:
         """The scene of that name, or None when it was not played."""

@@ -39,6 +39,7 @@ _LISTING_BYTES = 16_000_000
 _LOG_BYTES = 100_000
 _REGULAR_MODES = ("100644", "100755", "100664")
 _COMMIT = re.compile("[0-9a-fA-F]{4,64}")
+_INSTANT = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:Z|[+-]\d\d:\d\d)")
 
 # Ours, given with every call. `info/attributes` below does the same for what attributes can ask for.
 _CONFIGURATION = (
@@ -102,11 +103,12 @@ class Tree:
 
 @dataclass(frozen=True)
 class Clone:
-    """A commit taken from an address, its files in `folder`."""
+    """A commit taken from an address, its files in `folder`; `committed` is when it was made, ISO 8601."""
 
     folder: Path
     commit: str
     tree: Tree
+    committed: str = ""
 
 
 class _Git:
@@ -325,6 +327,7 @@ def facts(top: Path, package_path: str, package: Path, files: tuple[str, ...], s
         pushed=bool(branches),
         products=tuple(clean(path, _NAME_LENGTH) for path in made[:_LISTED]),
         products_count=len(made),
+        committed=_committed_at(git, commit),
     )
 
 
@@ -448,7 +451,13 @@ def take(address: str, scratch: Path, commit: str | None, before: datetime | Non
     if sum(blob.size for blob in tree.blobs) > intake.unpacked_bytes:
         raise refusal("too-large", limit=intake.unpacked_bytes // 1_000_000)
     _write_out(git, found, tree, address)
-    return Clone(scratch / "commit", found, tree)
+    return Clone(scratch / "commit", found, tree, _committed_at(git, found))
+
+
+def _committed_at(git: _Git, commit: str | None) -> str:
+    """When *commit* was made, as it says itself: ISO 8601 with its time zone; empty when there is none."""
+    found = git.lines("show", "--no-patch", "--format=%cI", commit) if commit else None
+    return next((line for line in found or () if _INSTANT.fullmatch(line)), "")
 
 
 def _tar_headers() -> int:
@@ -522,4 +531,5 @@ def facts_of(clone: Clone, address: str, package_path: str) -> GitFacts:
         pushed=True,
         products=tuple(clean(path, _NAME_LENGTH) for path in made[:_LISTED]),
         products_count=len(made),
+        committed=clone.committed,
     )
