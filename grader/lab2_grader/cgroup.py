@@ -24,7 +24,9 @@ REMOVE_SECONDS = 2.0
 PREFIX = "lab2-"
 
 # The process puts itself into the group before it becomes the program, so that nothing of it is ever outside.
-ENTER = 'n=$1; shift; while [ "$n" -gt 0 ]; do echo $$ > "$1/cgroup.procs" || exit 125; shift; n=$((n-1)); done; exec "$@"'
+ENTER = (
+    'n=$1; shift; while [ "$n" -gt 0 ]; do echo $$ > "$1/cgroup.procs" || exit 125; shift; n=$((n-1)); done; exec "$@"'
+)
 
 
 class Base(Record, frozen=True):
@@ -127,7 +129,11 @@ class Group:
             name = "memory.limit_in_bytes" if self._version == 1 else "memory.max"
             (memory / name).write_text(str(limits.memory_bytes))
             with contextlib.suppress(OSError):  # where there is no swap there is no such file
-                swap = ("memory.memsw.limit_in_bytes", limits.memory_bytes) if self._version == 1 else ("memory.swap.max", 0)
+                swap = (
+                    ("memory.memsw.limit_in_bytes", limits.memory_bytes)
+                    if self._version == 1
+                    else ("memory.swap.max", 0)
+                )
                 (memory / swap[0]).write_text(str(swap[1]))
 
     def wrap(self, argv: tuple[str, ...]) -> tuple[str, ...]:

@@ -61,6 +61,7 @@ class Manifest(Record, frozen=True):
     seconds: Seconds
     faults: tuple[str, ...]
     scenes: tuple[SceneEntry, ...]
+    began: str = ""
 
 
 class _Version(msgspec.Struct, frozen=True):
@@ -116,9 +117,10 @@ class Writer:
         faults: tuple[str, ...],
         scenes: tuple[SceneEntry, ...],
         finished: bool,
+        began: str = "",
     ) -> None:
         """Record how far the run has come."""
-        manifest = Manifest(EVIDENCE_SCHEMA, finished, runtime, seconds, faults, scenes)
+        manifest = Manifest(EVIDENCE_SCHEMA, finished, runtime, seconds, faults, scenes, began)
         write_atomically(self.folder / MANIFEST, pretty(manifest))
 
 
@@ -152,7 +154,7 @@ def read(folder: Path) -> Evidence:
     build_path = folder / BUILD
     build = _decode(build_path, _bytes(build_path), Build) if build_path.exists() or manifest.scenes else None
     scenes = tuple(_scene(folder, entry) for entry in manifest.scenes)
-    return Evidence(facts, build, scenes, manifest.runtime, manifest.faults, manifest.seconds)
+    return Evidence(facts, build, scenes, manifest.runtime, manifest.faults, manifest.seconds, manifest.began)
 
 
 def digest(folder: Path) -> str:

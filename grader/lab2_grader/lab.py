@@ -193,7 +193,7 @@ class Rubric(Record, frozen=True):
     check: tuple[RubricCheck, ...]
 
 
-class Symptom(Record):
+class Symptom(Record, frozen=True):
     """A row of the worksheet's troubleshooting table; texts are Markdown.
 
     Args:
@@ -215,7 +215,7 @@ class Symptom(Record):
     fix: str
 
 
-class _Symptoms(Record):
+class _Symptoms(Record, frozen=True):
     symptom: tuple[Symptom, ...]
 
 

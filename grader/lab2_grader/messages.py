@@ -44,6 +44,7 @@ class Catalogue(Record, frozen=True):
     status: dict[str, str]
     note: dict[str, str]
     refusal: dict[str, Refusal]
+    report: dict[str, str]
 
 
 Value = str | int | float
@@ -71,6 +72,11 @@ def status(key: str, **values: Value) -> str:
 def note(key: str, **values: Value) -> str:
     """The sentence of `[note]` under *key*."""
     return fill(catalogue().note[key], **values)
+
+
+def report(key: str, **values: Value) -> str:
+    """The sentence of `[report]` under *key*."""
+    return fill(catalogue().report[key], **values)
 
 
 def refusal(rule: str, **values: Value) -> RefusedError:

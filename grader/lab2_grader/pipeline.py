@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from datetime import datetime, timezone
 from pathlib import Path
 
 import msgspec
@@ -31,6 +32,7 @@ from lab2_grader.stage import Stage, entry
 EVIDENCE = "evidence"
 
 Progress = Callable[[str], None]
+Publish = Callable[[Result, Evidence, str], None]
 
 
 class Means(Record, frozen=True):
@@ -54,7 +56,13 @@ class Means(Record, frozen=True):
         return Runtime(self.ros.kind, self.ros.distro, self.clock.value, self.isolation.name, __version__)
 
 
-def grade(source: str, out: Path | Callable[[str], Path], means: Means, progress: Progress) -> tuple[Result, Path]:
+def _to_nobody(result: Result, observed: Evidence, stage: str) -> None:
+    """The default of `publish`."""
+
+
+def grade(
+    source: str, out: Path | Callable[[str], Path], means: Means, progress: Progress, publish: Publish = _to_nobody
+) -> tuple[Result, Path]:
     """Grade one submission.
 
     Args:
@@ -62,6 +70,8 @@ def grade(source: str, out: Path | Callable[[str], Path], means: Means, progress
         out: Where the result goes, or what makes that of the submission's name.
         means: With what.
         progress: Told in a few words what begins.
+        publish: Given the result as far as it stands, its evidence, and the stage that begins (empty at the end), whenever
+            a stage ends: for whoever must show something although the run may be killed.
 
     Returns:
         The result and the folder that holds it.
@@ -76,11 +86,17 @@ def grade(source: str, out: Path | Callable[[str], Path], means: Means, progress
         progress("taking the submission over")
         taken = submission.take(source, scratch / "package")
         folder = out(taken.facts.name) if callable(out) else out
-        return grade_taken(taken, scratch, folder, means, progress, began), folder
+        return grade_taken(taken, scratch, folder, means, progress, began, publish), folder
 
 
 def grade_taken(
-    taken: Submission, scratch: Path, folder: Path, means: Means, progress: Progress, began: float | None = None
+    taken: Submission,
+    scratch: Path,
+    folder: Path,
+    means: Means,
+    progress: Progress,
+    began: float | None = None,
+    publish: Publish = _to_nobody,
 ) -> Result:
     """Grade a submission that was taken over already.
 
@@ -91,11 +107,12 @@ def grade_taken(
         means: With what.
         progress: Told in a few words what begins.
         began: When the work on it began, on the monotonic clock; None for now.
+        publish: As for `grade`.
 
     Raises:
         OSError: The folder for the result cannot be written.
     """
-    record = _Recorder(folder, means, taken.facts, time.monotonic() if began is None else began)
+    record = _Recorder(folder, means, taken.facts, time.monotonic() if began is None else began, publish)
     try:
         (scratch / "build").mkdir()
         with Stage(means.ros, means.isolation, record.writer, scratch, means.clock) as stage:
@@ -124,18 +141,20 @@ def rescore(folder: Path, rubric: Rubric) -> Result:
 
 
 def write_reports(folder: Path, result: Result) -> None:
-    """Write every report of *result* to *folder*, each whole or not at all."""
-    for name, data in report.files(result):
+    """Write every report of *result* to *folder*, which holds its evidence; each whole or not at all."""
+    for name, data in report.files(result, evidence.read(folder / EVIDENCE)):
         evidence.write_atomically(folder / name, data)
 
 
 class _Recorder:
     """Keeps what has been observed so far on disk, so that a run that is killed still says how far it came."""
 
-    def __init__(self, folder: Path, means: Means, facts: SubmissionFacts, began: float) -> None:
+    def __init__(self, folder: Path, means: Means, facts: SubmissionFacts, began: float, publish: Publish) -> None:
         self._folder = folder
         self._means = means
         self._began = began
+        self._began_at = datetime.now(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
+        self._publish = publish
         self._facts = facts
         self._build: Build | None = None
         self._scenes: tuple[Scene, ...] = ()
@@ -153,9 +172,9 @@ class _Recorder:
         stopped = (*self._faults, messages.status("interrupted", stage=name))
         partial = self._evidence(stopped)
         result = score(partial, checks.judge(partial), self._means.rubric, "")
-        evidence.write_atomically(
-            self._folder / report.RESULT, evidence.pretty(msgspec.structs.replace(result, graded=False, score=None))
-        )
+        result = msgspec.structs.replace(result, graded=False, score=None)
+        evidence.write_atomically(self._folder / report.RESULT, evidence.pretty(result))
+        self._publish(result, partial, name)
 
     def built(self, built: Build) -> None:
         """The build has ended."""
@@ -178,6 +197,7 @@ class _Recorder:
         self._write_manifest(finished=True)
         result = rescore(self._folder, self._means.rubric)
         write_reports(self._folder, result)
+        self._publish(result, evidence.read(self._folder / EVIDENCE), "")
         return result
 
     def _seconds(self) -> Seconds:
@@ -186,11 +206,11 @@ class _Recorder:
         return Seconds(round(build_seconds, 2), round(self._run_seconds, 2), round(total, 2))
 
     def _evidence(self, faults: tuple[str, ...]) -> Evidence:
-        return Evidence(self._facts, self._build, self._scenes, self._runtime, faults, self._seconds())
+        return Evidence(self._facts, self._build, self._scenes, self._runtime, faults, self._seconds(), self._began_at)
 
     def _write_manifest(self, finished: bool) -> None:
         entries = tuple(entry(scene) for scene in self._scenes)
-        self.writer.manifest(self._runtime, self._seconds(), self._faults, entries, finished)
+        self.writer.manifest(self._runtime, self._seconds(), self._faults, entries, finished, self._began_at)
 
 
 def results_folder(results: Path, name: str) -> Path:

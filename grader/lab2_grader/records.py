@@ -117,6 +117,7 @@ class GitFacts(Record, frozen=True):
         pushed: HEAD is on a branch of a remote, as far as the repository knows.
         products: Committed build products and caches, at most 20.
         products_count: How many there are in all.
+        committed: When that commit was made, ISO 8601 with its time zone; empty when unknown.
     """
 
     commit: str | None
@@ -126,6 +127,7 @@ class GitFacts(Record, frozen=True):
     pushed: bool
     products: tuple[str, ...]
     products_count: int
+    committed: str = ""
 
 
 class SubmissionFacts(Record, frozen=True):
@@ -449,6 +451,7 @@ class Evidence(Record, frozen=True):
         runtime: With what.
         faults: What of ours failed outside a scene, a sentence each.
         seconds: How long it took.
+        began: When grading began, ISO 8601 in UTC.
     """
 
     submission: SubmissionFacts
@@ -457,6 +460,7 @@ class Evidence(Record, frozen=True):
     runtime: Runtime
     faults: tuple[str, ...]
     seconds: Seconds
+    began: str = ""
 
     def scene(self, name: SceneName) -> Scene | None:
         """The scene of that name, or None when it was not played."""

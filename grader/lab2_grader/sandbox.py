@@ -164,7 +164,11 @@ def limits_kept_by() -> str:
     base = process.control_groups()
     if base:
         return f"Memory, processors and processes of a submission are limited by the kernel (control groups, version {base.version})."
-    processes = "the kernel (a limit of its user namespace)" if _few_processes(Limits(0, processes=1)) else "the grader, which looks ten times a second"
+    processes = (
+        "the kernel (a limit of its user namespace)"
+        if _few_processes(Limits(0, processes=1))
+        else "the grader, which looks ten times a second"
+    )
     return (
         f"No control group can be made here: processes are limited by {processes}, memory and processors by the grader, "
         "which looks ten times a second and does not see files in memory."

@@ -32,6 +32,7 @@ from lab2_grader.records import (
     ScenePlan,
 )
 from lab2_grader.ros import Ros
+from lab2_grader.ros.domains import Domain
 
 INSTALLED = f"{sandbox.WORKSPACE}/install"
 OBSERVER_OUTPUT_BYTES = 40_000_000
@@ -66,9 +67,10 @@ class _Observer:
 
     def __init__(self, ros: Ros, isolation: sandbox.Isolation, home: Path) -> None:
         self._sink: Callable[[bytes], object] | None = None
-        self._early: list[bytes] = []
         self._errors = bytearray()
-        environment = dict(ros.environment(str(home)))
+        self._domain = None if isolation.on else Domain()
+        self._world = self._domain.environment() if self._domain else ()
+        environment = dict(ros.environment(str(home)) + self._world)
         here = str(Path(__file__).parent.parent)
         environment["PYTHONPATH"] = ":".join(filter(None, (here, environment.get("PYTHONPATH", ""))))
         conversation = lab.limits().conversation
@@ -92,7 +94,8 @@ class _Observer:
         began = time.monotonic()
         with path.open("wb", buffering=0) as file:
             self._sink = file.write
-            self._process.send(msgspec.json.encode(plan) + b"\n")
+            program = msgspec.structs.replace(plan.program, env=plan.program.env + self._world)
+            self._process.send(msgspec.json.encode(msgspec.structs.replace(plan, program=program)) + b"\n")
             outcome = self._process.wait()
         complete = outcome.code == 0 and not outcome.dropped_bytes
         fault = ""
@@ -109,6 +112,8 @@ class _Observer:
         if self._process.running:
             self._process.stop(EndedBy.GRADER)
             self._process.wait()
+        if self._domain is not None:
+            self._domain.close()
 
 
 class Stage:

@@ -150,6 +150,23 @@ class Strip:
     mark: Mark = Mark.PLAIN
 
 
+@dataclass(frozen=True)
+class Span:
+    """A stretch of time with a name, in seconds."""
+
+    name: str
+    begin: float
+    end: float
+
+
+@dataclass(frozen=True)
+class TimelineRow:
+    """What happened under a label, one stretch after another."""
+
+    label: str
+    spans: tuple[Span, ...]
+
+
 # --- the ROS graph ------------------------------------------------------------------------------
 
 
@@ -348,8 +365,12 @@ def _edge(upper: _Box, lower: _Box, edge: GraphEdge, down: bool, edges: Sequence
 
 
 def first_departure(observed: Sequence[float | None], expected: Sequence[float]) -> int | None:
-    """Index of the first observed value that is not the expected one; None when there is none in their common length."""
-    return next((index for index, pair in enumerate(zip(observed, expected)) if pair[0] != pair[1]), None)
+    """Index of the first observed value that is not the expected one; None when there is none in their common length.
+
+    A gap, where nothing was seen, is no departure.
+    """
+    pairs = enumerate(zip(observed, expected))
+    return next((index for index, (seen, asked) in pairs if seen is not None and seen != asked), None)
 
 
 def sequence_svg(
@@ -514,6 +535,50 @@ def strip_svg(strips: Sequence[Strip], *, id_prefix: str, title: str, desc: str 
         for strip in strips
     )
     return _svg(width, y, id_prefix, title, desc or made, parts)
+
+
+def timeline_svg(rows: Sequence[TimelineRow], *, id_prefix: str, title: str, desc: str = "", width: int = 620) -> str:
+    """Rows of stretches of time under one axis of seconds; a stretch too narrow for its name is only named in words.
+
+    Args:
+        rows: The rows, top to bottom.
+        id_prefix: Makes the ids of this picture unique in the page.
+        title: The picture's name, a few words.
+        desc: The picture in words; empty to have it made from the rows.
+        width: Natural width.
+    """
+    total = max((row.spans[-1].end for row in rows if row.spans), default=0.0) or 1.0
+    left, right = _PAD, width - _PAD
+
+    def x(seconds: float) -> float:
+        return left + (right - left) * seconds / total
+
+    parts: list[str] = []
+    y = 4.0
+    for row in rows:
+        whole = row.spans[-1].end - row.spans[0].begin if row.spans else 0.0
+        parts.append(
+            f'<text x="{_PAD:.0f}" y="{y + 13:.0f}"><tspan font-weight="600">{escape(row.label)}</tspan>'
+            f'<tspan class="small soft" dx="8">{whole:.1f} s</tspan></text>'
+        )
+        for number, span in enumerate(row.spans):
+            begin, end = x(span.begin), x(span.end)
+            shade = "node" if number % 2 == 0 else "topic"
+            parts.append(
+                f'<rect class="box {shade}" x="{begin:.1f}" y="{y + 20:.0f}" width="{max(end - begin, 1):.1f}" height="24"/>'
+            )
+            if len(span.name) * _SANS + 8 < end - begin:
+                parts.append(_text((begin + end) / 2, y + 36, span.name, "small", "middle"))
+        y += 54
+    parts.append(f'<path class="axis" d="M{left:.0f} {y:.0f}H{right:.0f}"/>')
+    step = next((step for step in (0.5, 1, 2, 5, 10, 20, 60, 120) if total / step <= 8), 300)
+    for tick in range(int(total / step) + 1):
+        parts.append(f'<path class="axis" d="M{x(tick * step):.1f} {y:.0f}v5"/>')
+        parts.append(_text(x(tick * step), y + 18, f"{tick * step:g} s", "small soft", "middle" if tick else "start"))
+    words = desc or " ".join(
+        f"{row.label}: {', '.join(f'{span.name} {span.end - span.begin:.1f} s' for span in row.spans)}." for row in rows
+    )
+    return _svg(width, y + 26, id_prefix, title, words, parts)
 
 
 # --- shared -------------------------------------------------------------------------------------
