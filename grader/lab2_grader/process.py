@@ -105,6 +105,17 @@ def tree(root: int) -> tuple[ProcessInfo, ...]:
     return tuple(found)
 
 
+def busy(root: int) -> bool:
+    """Whether a thread of *root* or of its descendants runs, or waits for a processor or a disk."""
+    for pid in _descendants(root):
+        with contextlib.suppress(OSError):
+            for thread in Path(f"/proc/{pid}/task").iterdir():
+                text = (thread / "stat").read_bytes()
+                if text[text.rindex(b")") + 2 :][:1] in (b"R", b"D"):
+                    return True
+    return False
+
+
 class Process:
     """A started process whose output is pumped by a thread of its own.
 

@@ -56,7 +56,9 @@ def complaints(animal: Animal, result: Result) -> list[str]:
     found = []
     expected = animal.statuses()
     for check in result.checks:
-        seen = f"{check.id}: {check.status.value} {check.message} {check.because or ''} ({check.observed} | {check.hint})"
+        seen = (
+            f"{check.id}: {check.status.value} {check.message} {check.because or ''} ({check.observed} | {check.hint})"
+        )
         if check.status.value != expected[check.id]:
             found.append(f"{seen} instead of {expected[check.id]}")
         elif check.status is Status.FAIL:
