@@ -224,7 +224,7 @@ class Clock(str, Enum):
 
 
 class Phase(Row, frozen=True):
-    """A part of the scene begins: `start`, `graph`, `period`, `slow`, `fast`, `real-time`, `send`, `stop`."""
+    """A part of the scene begins: `start`, `graph`, `period`, `slow`, `fast`, `real-time`, `send <topic>`, `stop`."""
 
     at: float
     name: str
@@ -368,6 +368,8 @@ class ScenePlan(Record, frozen=True):
         clock: Who drives the ROS clock.
         program: What to start in the submission's sandbox.
         label: The executable's name when the program is one executable; empty when it is a launch.
+        talker: The executable that is the talker of a launch.
+        listener: The executable that is the listener of a launch.
         numbers: Numbers to publish (listener).
         texts: Strings to publish (listener).
     """
@@ -376,6 +378,8 @@ class ScenePlan(Record, frozen=True):
     clock: Clock
     program: Request
     label: str
+    talker: str = ""
+    listener: str = ""
     numbers: tuple[int, ...] = ()
     texts: tuple[str, ...] = ()
 
