@@ -411,8 +411,8 @@ def sequence_svg(
             if value is not None
         ]
     if at is not None and at < count:
-        value = seen[at] if at < len(seen) else None
-        marked = value if value is not None else asked[at] if at < len(asked) else low
+        there = seen[at] if at < len(seen) else None
+        marked = there if there is not None else asked[at] if at < len(asked) else low
         parts.append(f'<path class="edge missing" d="M{x(at):.1f} {top:.0f}V{bottom:.0f}"/>')
         parts.append(f'<circle class="ring" cx="{x(at):.1f}" cy="{y(marked):.1f}" r="7"/>')
         anchor = "start" if x(at) < width * 0.35 else "end" if x(at) > width * 0.65 else "middle"

@@ -1,0 +1,1 @@
+"""Builds the worksheet of lab 2: student and staff edition, a fragment, and the README of the template."""
