@@ -23,7 +23,7 @@ class Recording(Record):
         versions: Versions of what it was played with, by name.
         cli: For each `ros2` verb of the page (`topic info`), the options that its help names.
         colcon: The options that the help of `colcon build` names.
-        outputs: What each played command printed, by id, made the same for everyone by `normalise`.
+        outputs: The first lines of what each command printed that the page shows, by id, through `normalise`.
     """
 
     recorded: date
@@ -37,7 +37,8 @@ class Recording(Record):
 _CHANGES = (
     (re.compile(r"\[\d{9,}\.\d+\]"), "[<time>]"),
     (re.compile(r"pid \[\d+\]"), "pid [<number>]"),
-    (re.compile(r"(\.ros/log/)\S+"), r"\1<date and time>"),
+    (re.compile(r"(All log files can be found below) \S+"), r"\1 ~/.ros/log/<date and time>"),
+    (re.compile(r"object at 0x[0-9a-f]+"), "object at <address>"),
     (re.compile(r"\[\d+\.\d+s\]"), "[<seconds>s]"),
     (re.compile(r"GID: [0-9a-f.]+"), "GID: <number>"),
     (re.compile(r"\[main [0-9a-f]{7,}\]"), "[main <id>]"),

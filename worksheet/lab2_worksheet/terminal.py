@@ -50,8 +50,9 @@ class Terminal:
 
     @property
     def text(self) -> str:
-        """What was printed since `clear`, without escape sequences and carriage returns."""
-        return _ESCAPES.sub("", self._raw.decode(errors="replace")).replace("\r", "")
+        """What stands on the screen since `clear`: no escape sequences, and of a rewritten line its last state."""
+        plain = _ESCAPES.sub("", self._raw.decode(errors="replace")).replace("\r\n", "\n")
+        return "\n".join(line.rstrip("\r").rpartition("\r")[2] for line in plain.split("\n"))
 
     @property
     def output(self) -> str:
