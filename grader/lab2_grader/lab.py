@@ -191,6 +191,32 @@ class Rubric(Record, frozen=True):
     check: tuple[RubricCheck, ...]
 
 
+class Symptom(Record):
+    """A row of the worksheet's troubleshooting table; texts are Markdown.
+
+    Args:
+        id: What messages of the grader and the page call it.
+        section: The section of the worksheet that explains what went wrong.
+        see: What the student sees.
+        pasted: Pieces of an error message by which the row is found; `*` stands for anything.
+        cause: The likely cause.
+        check: How to make sure.
+        fix: How to mend it.
+    """
+
+    id: str
+    section: str
+    see: str
+    pasted: tuple[str, ...]
+    cause: str
+    check: str
+    fix: str
+
+
+class _Symptoms(Record):
+    symptom: tuple[Symptom, ...]
+
+
 def _read(path: Path, kind: type[T]) -> T:
     """Decode *path* as *kind*.
 
@@ -230,3 +256,43 @@ def rubric(path: Path | None = None) -> Rubric:
         UsageError: The file does not validate.
     """
     return _read(path or FACTS / "rubric.toml", Rubric)
+
+
+@functools.cache
+def symptoms() -> tuple[Symptom, ...]:
+    """The rows of the troubleshooting table, with the lab's facts in their texts.
+
+    Raises:
+        UsageError: The file does not validate, or names a fact that there is not.
+    """
+    spec, names = specification(), course()
+    facts = {
+        "package": spec.package,
+        "workspace": names.workspace,
+        "distro": names.ros_distro,
+        "text_topic": spec.text_topic.name,
+        "number_topic": spec.number_topic.name,
+        "number_type": spec.number_topic.type,
+        "smallest": str(spec.number_topic.smallest),
+        "largest": str(spec.number_topic.largest),
+        "before_largest": str(spec.number_topic.largest - 1),
+        "numeric_talker": spec.numeric.talker,
+        "numeric_listener": spec.numeric.listener,
+        "numeric_launch": spec.numeric.launch_file,
+    }
+
+    def filled(row: Symptom) -> Symptom:
+        try:
+            return Symptom(
+                id=row.id,
+                section=row.section,
+                see=row.see.format_map(facts),
+                pasted=tuple(piece.format_map(facts) for piece in row.pasted),
+                cause=row.cause.format_map(facts),
+                check=row.check.format_map(facts),
+                fix=row.fix.format_map(facts),
+            )
+        except (KeyError, ValueError, IndexError) as error:
+            raise UsageError(f"symptoms.toml: {row.id} names a fact that there is not: {error}.") from error
+
+    return tuple(filled(row) for row in _read(FACTS / "symptoms.toml", _Symptoms).symptom)
