@@ -104,7 +104,7 @@ class Question(Record):
     id: str
     after: str
     ask: str
-    options: tuple[Option, ...]
+    option: tuple[Option, ...]
 
 
 class _Commands(Record):
@@ -190,6 +190,6 @@ def questions() -> dict[str, Question]:
     path = SOURCE / "questions.toml"
     found = _by_id(path, _read(path, _Questions).question)
     for question in found.values():
-        if sum(option.right for option in question.options) != 1 or not all(o.reason for o in question.options):
+        if sum(option.right for option in question.option) != 1 or not all(o.reason for o in question.option):
             raise SourceError(f"{path.name}: {question.id} needs one right answer, and a reason for each answer.")
     return found

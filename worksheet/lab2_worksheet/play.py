@@ -30,7 +30,7 @@ _ASKED_AGAIN = ("ros2 node ", "ros2 topic list", "ros2 topic info")
 _DROPPED = ("ROS_HOME", "ROS_LOG_DIR", "PWD", "OLDPWD", "PYTHONDONTWRITEBYTECODE", "VIRTUAL_ENV")
 _OPTION = re.compile(r"(?<![\w-])(-\w|--[a-z][a-z-]+)")
 _VERBS = ("run", "launch", "pkg executables", "node list", "node info", "topic list", "topic info", "topic echo")
-_MORE_VERBS = ("topic hz", "topic pub", "topic type", "interface show", "daemon stop", "doctor")
+_MORE_VERBS = ("topic hz", "topic pub", "interface show", "pkg create", "daemon stop")
 
 
 @dataclass
