@@ -98,7 +98,7 @@
       button.focus();
       button.textContent = copied ? "Copied" : "Select and copy by hand";
       announce(copied ? "Copied" : "Copying is not allowed here");
-      setTimeout(() => { button.textContent = "Copy"; }, 2000);
+      setTimeout(() => { button.textContent = "Copy"; }, 1500);
     });
     all("figcaption", block)[0].append(button);
   }
@@ -168,10 +168,11 @@
   where();
 
   // --- paper: what is folded is opened for printing ----------------------------------------------
-  let opened = [];
+  const opened = [];
   addEventListener("beforeprint", () => {
-    opened = all("main details:not([open])");
-    for (const details of opened) details.open = true;
+    const folded = all("main details:not([open])");
+    for (const details of folded) details.open = true;
+    opened.push(...folded);
   });
-  addEventListener("afterprint", () => { for (const details of opened) details.open = false; });
+  addEventListener("afterprint", () => { for (const details of opened.splice(0)) details.open = false; });
 })();

@@ -247,7 +247,7 @@ class HtmlBlocks:
         if not chosen:
             raise SourceError(f"questions.toml has no question after {section}.")
         self._used.update(f"question:{question.id}" for question in chosen)
-        return self._keep(self._templates.questions(chosen, markdown.inline))
+        return self._keep(self._templates.questions(section, chosen, markdown.inline))
 
     def done(self, key: str, label: str) -> Markup:
         """A box to tick, kept in the browser; *key* is its name there and never changes."""

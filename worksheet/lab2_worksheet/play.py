@@ -94,7 +94,9 @@ def play(say: Callable[[str], None] = lambda text: None) -> Played:
             if command.terminal not in terminals:
                 terminals[command.terminal] = stack.enter_context(Terminal(env, str(home)))
             if command.terminal in running.values():
-                wrong.append(f"{command.id}: terminal {command.terminal} is busy; the manifest must stop what runs there.")
+                wrong.append(
+                    f"{command.id}: terminal {command.terminal} is busy; the manifest must stop what runs there."
+                )
                 break
             say(f"{command.terminal}$ {command.run}")
             terminal = terminals[command.terminal]
@@ -119,7 +121,7 @@ def play(say: Callable[[str], None] = lambda text: None) -> Played:
 
 
 def _type_and_compare(command: Command, terminal: Terminal) -> list[str]:
-    """Type *command* and compare; a question about the graph is asked again for a while, as discovery takes a moment."""
+    """Type *command* and compare. A question about the graph is asked again for a while: discovery takes a moment."""
     deadline = time.monotonic() + START_SECONDS
     while True:
         terminal.clear()
