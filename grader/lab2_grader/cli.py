@@ -83,19 +83,32 @@ def _parser() -> argparse.ArgumentParser:
 
     grade_all = commands.add_parser("grade-all", help="grade a class; go on where an earlier call stopped")
     grade_all.add_argument(
-        "inbox", help="a folder of submissions, a download from Minerva or Moodle, or a CSV of students and repositories"
+        "inbox",
+        help="a folder of submissions, a download from Minerva or Moodle, or a CSV of students and repositories",
     )
     grade_all.add_argument("--out", type=Path, default=Path("results"), help="where the results go (default: results)")
-    grade_all.add_argument("--jobs", type=_positive, default=0, help="submissions at once (default: what this machine carries)")
+    grade_all.add_argument(
+        "--jobs", type=_positive, default=0, help="submissions at once (default: what this machine carries)"
+    )
     grade_all.add_argument("--rubric", type=Path, help="a rubric of your own")
-    grade_all.add_argument("--before", type=_deadline, metavar="TIME", help="of repositories, take the last commit before")
-    grade_all.add_argument("--scheduler", default="", metavar="ADDRESS", help="send the work to a Dask cluster (tcp://…)")
+    grade_all.add_argument(
+        "--before", type=_deadline, metavar="TIME", help="of repositories, take the last commit before"
+    )
+    grade_all.add_argument(
+        "--scheduler", default="", metavar="ADDRESS", help="send the work to a Dask cluster (tcp://…)"
+    )
     grade_all.add_argument("--ros", choices=("auto", "sourced", "wheels"), default="auto", help="which ROS to use")
-    grade_all.add_argument("--clock", type=Clock, choices=list(Clock), default=Clock.TIME_LAPSE, help="how time is driven")
-    grade_all.add_argument("--isolation", choices=("auto", "off"), default="auto", help="off: run them with your own rights")
+    grade_all.add_argument(
+        "--clock", type=Clock, choices=list(Clock), default=Clock.TIME_LAPSE, help="how time is driven"
+    )
+    grade_all.add_argument(
+        "--isolation", choices=("auto", "off"), default="auto", help="off: run them with your own rights"
+    )
     grade_all.set_defaults(run=_grade_all)
 
-    book = commands.add_parser("gradebook", help="take marks to a gradebook").add_subparsers(required=True, metavar="COMMAND")
+    book = commands.add_parser("gradebook", help="take marks to a gradebook").add_subparsers(
+        required=True, metavar="COMMAND"
+    )
     fill = book.add_parser("fill", help="fill a file downloaded from Minerva or Moodle with the marks of a class")
     fill.add_argument("--results", type=Path, required=True, help="the folder that grade-all wrote")
     fill.add_argument("--in", dest="download", type=Path, required=True, help="the file as it was downloaded")
@@ -159,7 +172,11 @@ def _grade_all(arguments: argparse.Namespace) -> int:
         scheduler=arguments.scheduler,
     )
     if not order.isolation:
-        err.print(Text(sandbox.protections_off(sandbox.Isolation(on=False, reason="it was switched off")), style="bold yellow"))
+        err.print(
+            Text(
+                sandbox.protections_off(sandbox.Isolation(on=False, reason="it was switched off")), style="bold yellow"
+            )
+        )
     live = err.is_terminal
     progress = Progress(None if live else lambda line: err.print(Text(line)))
     with Live(progress, console=err, refresh_per_second=4) if live else nullcontext():
@@ -178,7 +195,9 @@ def _fill(arguments: argparse.Namespace) -> int:
     filled = gradebook.fill(
         arguments.results, arguments.download, arguments.out, column=arguments.column, feedback=arguments.feedback
     )
-    out.print(Text(f"{filled.cells} marks written to {arguments.out}, out of {filled.total} each, column “{filled.column}”."))
+    out.print(
+        Text(f"{filled.cells} marks written to {arguments.out}, out of {filled.total} each, column “{filled.column}”.")
+    )
     for heading, names in (
         ("Without a mark, so left as they were", filled.without_mark),
         ("In the gradebook, but nothing was handed in", filled.only_in_book),

@@ -25,7 +25,9 @@ _BOMS = (
     (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
-_TOTAL = re.compile(r"(?P<title>.*?)\s*\[Total Pts: (?P<total>\d+(?:[.,]\d+)?)(?: \w+)?\]\s*(?:\|(?P<id>\w+))?", re.DOTALL)
+_TOTAL = re.compile(
+    r"(?P<title>.*?)\s*\[Total Pts: (?P<total>\d+(?:[.,]\d+)?)(?: \w+)?\]\s*(?:\|(?P<id>\w+))?", re.DOTALL
+)
 _KEYS = ("username", "user name", "identifier", "id number", "student id", "email address", "email", "full name")
 
 
@@ -121,7 +123,9 @@ def _fill(text: str, lines: tuple[ClassLine, ...], column: str, feedback: bool) 
     plain = [name.lower() for name in header]
     keys = [plain.index(name) for name in _KEYS if name in plain]
     if not keys:
-        raise UsageError(f"The file has no column that names the student (Username or Identifier), only: {_shown(header)}.")
+        raise UsageError(
+            f"The file has no column that names the student (Username or Identifier), only: {_shown(header)}."
+        )
     mark_at, total_at, total = _mark_column(header, plain, column)
     title = header[mark_at]
     feedback_at = next((plain.index(n) for n in ("feedback to learner", "feedback comments") if n in plain), None)
@@ -184,7 +188,9 @@ def _mark_column(header: list[str], plain: list[str], wanted: str) -> tuple[int,
     if len(worth) != 1:
         names = _shown([header[at] for at, _ in found])
         reason = "Several columns could take the mark" if worth else "The column is worth 0 points"
-        raise UsageError(f"{reason}: {names}. " + ("Name one with --column." if worth else "Give it points in Minerva."))
+        raise UsageError(
+            f"{reason}: {names}. " + ("Name one with --column." if worth else "Give it points in Minerva.")
+        )
     return worth[0][0], None, worth[0][1]
 
 
@@ -207,7 +213,10 @@ def _plain_number(value: float) -> str:
 
 def _feedback(line: ClassLine) -> str:
     lost = "; ".join(f"{lost.check} (-{lost.points}): {lost.observed}" for lost in line.lost if lost.points)
-    return clean(f"{line.score} of {line.max_score}. " + (f"Lost: {lost}" if lost else "Everything asked was seen."), FEEDBACK_LENGTH)
+    return clean(
+        f"{line.score} of {line.max_score}. " + (f"Lost: {lost}" if lost else "Everything asked was seen."),
+        FEEDBACK_LENGTH,
+    )
 
 
 def _rows(text: str, delimiter: str) -> Iterator[list[Cell]]:

@@ -17,9 +17,20 @@ _NAME = re.compile(
     r"(?P<head>.+?)_attempt_(?P<time>\d{4}(?:-\d{2}){5})(?:_(?P<original>.+)|(?P<text>\.txt))", re.DOTALL
 )
 _PERSON = re.compile(r"(?P<name>.*?)\s*\((?P<user>[^()]*)\)\s*")
-_FIELDS = ("Name", "Assignment", "Date Submitted", "Current Grade", "Override Grade", "Submission Field", "Comments", "Files")
+_FIELDS = (
+    "Name",
+    "Assignment",
+    "Date Submitted",
+    "Current Grade",
+    "Override Grade",
+    "Submission Field",
+    "Comments",
+    "Files",
+)
 _FIELD = re.compile(rf"(?P<field>{'|'.join(_FIELDS)}):[ \t]*(?P<rest>.*)")
-_ADDRESS = re.compile(r"(?:https?://|git@)[^\s<>\"'()\[\]{}|\\^`]+|(?:www\.)?github\.com/[\w.-]+/[\w.-]+", re.IGNORECASE)
+_ADDRESS = re.compile(
+    r"(?:https?://|git@)[^\s<>\"'()\[\]{}|\\^`]+|(?:www\.)?github\.com/[\w.-]+/[\w.-]+", re.IGNORECASE
+)
 _TAG = re.compile(r"<[^>]{0,500}>")
 
 

@@ -63,7 +63,9 @@ class Progress:
                 self._ends.append(time.monotonic())
             done = len(self._ended)
         if self._say:
-            mark = f"{line.score} of {line.max_score}" if line.score is not None else f"{line.state.value}: {line.reason}"
+            mark = (
+                f"{line.score} of {line.max_score}" if line.score is not None else f"{line.state.value}: {line.reason}"
+            )
             known = " (graded before)" if before else f" ({line.seconds:.1f} s)" if line.seconds else ""
             self._say(f"[{done}/{self._total}] {line.name}: {mark}{known}{self._left()}")
 

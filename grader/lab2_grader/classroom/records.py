@@ -56,6 +56,7 @@ class Inbox(Record, frozen=True):
     entries: tuple[Entry, ...]
     unknown: tuple[Unknown, ...]
 
+
 # --- the unit of work ---------------------------------------------------------------------------
 
 
@@ -95,6 +96,7 @@ class Graded(Record, frozen=True):
     conclusive: bool
     flags: tuple[str, ...] = ()
     fault: str = ""
+
 
 # --- what is on disk beside a result ------------------------------------------------------------
 

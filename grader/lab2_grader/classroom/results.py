@@ -1,10 +1,10 @@
 """The folder of a class's results: locked while it is written, each result whole or not there, known to be up to date or not.
 
-    results/
-      <name>/          a result as `grade` writes it, and class.json (Stamp)
-      index.html       the overview, with summary.csv and summary.json beside it
-      .lock            held while a class is graded or marked again
-      .incoming/       results that are being put in place; of no use to anybody
+results/
+  <name>/          a result as `grade` writes it, and class.json (Stamp)
+  index.html       the overview, with summary.csv and summary.json beside it
+  .lock            held while a class is graded or marked again
+  .incoming/       results that are being put in place; of no use to anybody
 """
 
 from __future__ import annotations

@@ -99,9 +99,7 @@ def grade_class(order: Order, watch: Watcher) -> ClassSummary:
 class _Run:
     """One call."""
 
-    def __init__(
-        self, order: Order, out: Path, watch: Watcher, perform: Perform, stop: Callable[[], None]
-    ) -> None:
+    def __init__(self, order: Order, out: Path, watch: Watcher, perform: Perform, stop: Callable[[], None]) -> None:
         self._order = order
         self._out = out
         self._watch = watch
@@ -215,9 +213,7 @@ class _Run:
         stamp = results.stamp(folder)
         if result is None or stamp is None:
             return None
-        now = msgspec.structs.replace(
-            stamp, student=entry.student, keys=entry.keys, shown=entry.shown, note=entry.note
-        )
+        now = msgspec.structs.replace(stamp, student=entry.student, keys=entry.keys, shown=entry.shown, note=entry.note)
         if now != stamp:
             results.restamp(folder, now)
         return summary.line_of(entry.name, result, now, folder)

@@ -67,7 +67,9 @@ def line_of(name: str, result: Result, known: Stamp, folder: Path) -> ClassLine:
     )
 
 
-def summarise(lines: Iterable[ClassLine], results: Iterable[Result], rubric: Rubric, unknown: Sequence[Unknown]) -> ClassSummary:
+def summarise(
+    lines: Iterable[ClassLine], results: Iterable[Result], rubric: Rubric, unknown: Sequence[Unknown]
+) -> ClassSummary:
     """The summary of a class.
 
     Args:

@@ -101,7 +101,11 @@ def _rate(check: CheckRate) -> float:
 @functools.cache
 def _environment() -> Environment:
     environment = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.globals |= {name: Markup((TEMPLATES / f"class.{name}").read_text()) for name in ("css", "js")}
     return environment
