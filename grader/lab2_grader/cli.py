@@ -16,16 +16,18 @@ from rich.live import Live
 from rich.spinner import Spinner
 from rich.text import Text
 
-from lab2_grader import __version__, lab, messages, pipeline, process, ros, sandbox
+from lab2_grader import __version__, lab, pipeline, process, ros, sandbox
+from lab2_grader.checks import verdicts
 from lab2_grader.errors import Lab2Error, RefusedError, UsageError
 from lab2_grader.records import Clock, Result
 from lab2_grader.report.terminal import terminal
 
 GRADED, BELOW, USAGE, NOT_GRADED, INTERRUPTED = 0, 1, 2, 3, 130
+PLAIN_WIDTH = 110  # columns when the output is no terminal
 LOG = "lab2-grader-fault.log"
 
-out = Console(highlight=False)
-err = Console(stderr=True, highlight=False)
+out = Console(highlight=False, width=None if sys.stdout.isatty() else PLAIN_WIDTH)
+err = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -34,8 +36,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, _interrupt)
     try:
         arguments = _parser().parse_args(argv)
-        code: int = arguments.run(arguments)
-        return code
+        return int(arguments.run(arguments))
     except KeyboardInterrupt:
         err.print("Interrupted. What was recorded so far is kept; nothing is left running.")
         return INTERRUPTED
@@ -53,12 +54,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         return NOT_GRADED
 
 
-def _interrupt(number: int, frame: FrameType | None) -> None:
+def _interrupt(_number: int, _frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="lab2-grader", description="Grades lab 2 by building, launching and listening.")
+    parser = argparse.ArgumentParser(
+        prog="lab2-grader", description="Grades lab 2 by building, launching and listening."
+    )
     parser.add_argument("--version", action="version", version=f"lab2-grader {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
@@ -87,7 +90,9 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _grade(arguments: argparse.Namespace) -> int:
-    means = pipeline.Means(ros.find(arguments.ros), _isolation(arguments), lab.rubric(arguments.rubric), arguments.clock)
+    means = pipeline.Means(
+        ros.find(arguments.ros), _isolation(arguments), lab.rubric(arguments.rubric), arguments.clock
+    )
     if not means.isolation.on:
         err.print(Text(sandbox.protections_off(means.isolation), style="bold yellow"))
         if means.isolation.mend:
@@ -129,11 +134,11 @@ def _explain(arguments: argparse.Namespace) -> int:
     checks = {check.id: check for check in lab.rubric().check}
     if arguments.check is None:
         for check in checks.values():
-            out.print(Text(f"{check.id:20} {check.points:3} points  {check.title}"))
+            out.print(Text(f"{check.id:20} {check.points:3} points  {check.title}"), soft_wrap=True)
         return GRADED
     if arguments.check not in checks:
         raise UsageError(f"There is no check {arguments.check}. There are: {', '.join(checks)}.")
-    out.print(Text(messages.explanation(checks[arguments.check])))
+    out.print(Text(verdicts.explanation(checks[arguments.check])), soft_wrap=True)
     return GRADED
 
 
@@ -167,7 +172,3 @@ class _Progress:
     def __exit__(self, *exception: object) -> None:
         if self._live is not None:
             self._live.stop()
-
-
-if __name__ == "__main__":
-    sys.exit(main())

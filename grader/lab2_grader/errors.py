@@ -1,9 +1,9 @@
 """The exception tree: whose fault it is decides what happens next.
 
-    Lab2Error
-    ├── UsageError          the caller asked for something that cannot be done      exit 2
-    ├── RefusedError        the submission breaks a rule of submission              exit 2
-    └── FaultError          the grader's or the machine's fault; no mark is given   exit 3
+Lab2Error
+├── UsageError          the caller asked for something that cannot be done      exit 2
+├── RefusedError        the submission breaks a rule of submission              exit 2
+└── FaultError          the grader's or the machine's fault; no mark is given   exit 3
 """
 
 from __future__ import annotations

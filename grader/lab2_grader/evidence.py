@@ -40,7 +40,7 @@ BUILD = "build.json"
 T = TypeVar("T")
 
 
-class SceneEntry(Record):
+class SceneEntry(Record, frozen=True):
     """What the manifest says of a scene; its events are in a file of their own. Fields as in `Scene`."""
 
     name: SceneName
@@ -52,7 +52,7 @@ class SceneEntry(Record):
     seconds: float
 
 
-class Manifest(Record):
+class Manifest(Record, frozen=True):
     """The table of contents of a folder of evidence; `finished` is false while the submission is still being run."""
 
     schema: str

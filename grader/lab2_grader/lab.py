@@ -1,4 +1,4 @@
-"""Reads and validates the lab's facts: course, specification, rubric, limits and messages, all TOML beside this module."""
+"""Reads and validates the lab's facts: course, specification, rubric and limits, all TOML beside this module."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FACTS = Path(__file__).parent / "facts"
 T = TypeVar("T")
 
 
-class Course(Record):
+class Course(Record, frozen=True):
     """This year's course: the facts that change when the lab is rolled over."""
 
     title: str
@@ -37,7 +37,7 @@ class Course(Record):
     fail_workflow_on_lost_points: bool
 
 
-class Pair(Record):
+class Pair(Record, frozen=True):
     """A talker, a listener and the launch file that starts both, by name."""
 
     talker: str
@@ -45,7 +45,7 @@ class Pair(Record):
     launch_file: str
 
 
-class TextTopic(Record):
+class TextTopic(Record, frozen=True):
     """The topic with greetings; `period_seconds` is that of the talker as handed out."""
 
     name: str
@@ -53,7 +53,7 @@ class TextTopic(Record):
     period_seconds: float
 
 
-class NumberTopic(Record):
+class NumberTopic(Record, frozen=True):
     """The topic with numbers; the count runs from `smallest` to `largest` and back to `smallest`."""
 
     name: str
@@ -62,7 +62,7 @@ class NumberTopic(Record):
     largest: int
 
 
-class Specification(Record):
+class Specification(Record, frozen=True):
     """What the worksheet asks of the package."""
 
     package: str
@@ -72,7 +72,7 @@ class Specification(Record):
     number_topic: NumberTopic
 
 
-class IntakeLimits(Record):
+class IntakeLimits(Record, frozen=True):
     """Bounds of what may be handed in, and of how long a clone may take."""
 
     archive_bytes: int
@@ -84,7 +84,7 @@ class IntakeLimits(Record):
     source_file_bytes: int
 
 
-class BuildLimits(Record):
+class BuildLimits(Record, frozen=True):
     """Bounds of `colcon build`."""
 
     seconds: float
@@ -93,14 +93,14 @@ class BuildLimits(Record):
     install_bytes: int
 
 
-class StartLimits(Record):
+class StartLimits(Record, frozen=True):
     """From starting the nodes to a complete graph."""
 
     seconds: float
     settle_seconds: float
 
 
-class ConversationLimits(Record):
+class ConversationLimits(Record, frozen=True):
     """Bounds and amounts of the conversation and of the talker alone."""
 
     timelapse_seconds: float
@@ -111,7 +111,7 @@ class ConversationLimits(Record):
     answer_seconds: float
 
 
-class ListenerLimits(Record):
+class ListenerLimits(Record, frozen=True):
     """Amounts of the listener alone."""
 
     numbers: int
@@ -119,25 +119,26 @@ class ListenerLimits(Record):
     answer_seconds: float
 
 
-class OriginalsLimits(Record):
+class OriginalsLimits(Record, frozen=True):
     """Bounds of the originals."""
 
     seconds: float
     messages: int
 
 
-class StopLimits(Record):
+class StopLimits(Record, frozen=True):
     """How long each rung of the ladder INT, TERM, KILL waits."""
 
     interrupt_seconds: float
     terminate_seconds: float
 
 
-class ResourceLimits(Record):
+class ResourceLimits(Record, frozen=True):
     """What the whole tree of a submission's processes may use."""
 
     processes: int
     memory_bytes: int
+    cpu_seconds: float
     file_bytes: int
     scratch_bytes: int
     output_bytes: int
@@ -151,10 +152,11 @@ class ResourceLimits(Record):
             processes=self.processes,
             memory_bytes=self.memory_bytes,
             file_bytes=self.file_bytes,
+            cpu_seconds=self.cpu_seconds,
         )
 
 
-class AllLimits(Record):
+class AllLimits(Record, frozen=True):
     """`limits.toml`."""
 
     intake: IntakeLimits
@@ -167,14 +169,14 @@ class AllLimits(Record):
     resources: ResourceLimits
 
 
-class ChecklistItem(Record):
+class ChecklistItem(Record, frozen=True):
     """An item of the worksheet's checklist (6.8)."""
 
     item: str
     text: str
 
 
-class RubricCheck(Record):
+class RubricCheck(Record, frozen=True):
     """A check as the rubric has it: what it is worth and which item it serves."""
 
     id: str
@@ -184,14 +186,14 @@ class RubricCheck(Record):
     points: int
 
 
-class Rubric(Record):
+class Rubric(Record, frozen=True):
     """The checklist and the checks, in the order in which reports show them."""
 
     checklist: tuple[ChecklistItem, ...]
     check: tuple[RubricCheck, ...]
 
 
-class Symptom(Record):
+class Symptom(Record, frozen=True):
     """A row of the worksheet's troubleshooting table; texts are Markdown.
 
     Args:
@@ -213,7 +215,7 @@ class Symptom(Record):
     fix: str
 
 
-class _Symptoms(Record):
+class _Symptoms(Record, frozen=True):
     symptom: tuple[Symptom, ...]
 
 

@@ -14,7 +14,7 @@ from lab2_grader.text import clean
 VALUE_LENGTH = 300  # characters of one value filled into a sentence
 
 
-class Fault(Record):
+class Fault(Record, frozen=True):
     """One way to miss a check, with `str.format` placeholders; `symptom` is the id of a troubleshooting row."""
 
     observed: str
@@ -22,7 +22,7 @@ class Fault(Record):
     symptom: str = ""
 
 
-class CheckTexts(Record):
+class CheckTexts(Record, frozen=True):
     """What is said of one check: what it asks, how it is judged, the ruling where the worksheet is silent."""
 
     expected: str
@@ -31,20 +31,20 @@ class CheckTexts(Record):
     fault: dict[str, Fault]
 
 
-class Refusal(Record):
+class Refusal(Record, frozen=True):
     """The sentence of one rule of submission, with `str.format` placeholders."""
 
     text: str
 
 
-class Catalogue(Record):
+class Catalogue(Record, frozen=True):
     """`messages.toml`."""
 
     check: dict[str, CheckTexts]
     status: dict[str, str]
     note: dict[str, str]
-    refusal: dict[str, Refusal] = {}
-    report: dict[str, str] = {}
+    refusal: dict[str, Refusal]
+    report: dict[str, str]
 
 
 Value = str | int | float
@@ -58,7 +58,9 @@ def catalogue() -> Catalogue:
 
 def fill(text: str, **values: Value) -> str:
     """*text* with *values* in its placeholders, each cleaned, because it may come from the submission."""
-    shown = {key: clean(value, VALUE_LENGTH) if isinstance(value, str) else f"{value:,}" for key, value in values.items()}
+    shown = {
+        key: clean(value, VALUE_LENGTH) if isinstance(value, str) else f"{value:,}" for key, value in values.items()
+    }
     return text.format_map(shown)
 
 
@@ -80,21 +82,3 @@ def report(key: str, **values: Value) -> str:
 def refusal(rule: str, **values: Value) -> RefusedError:
     """The refusal under *rule*."""
     return RefusedError(rule, fill(catalogue().refusal[rule].text, **values))
-
-
-def explanation(check: lab.RubricCheck) -> str:
-    """What *check* asks, how it is judged, what the ruling is where the worksheet is silent."""
-    from lab2_grader.checks.verdicts import known
-
-    texts = catalogue().check[check.id]
-    values = known(check.id)
-    return "\n".join(
-        (
-            f"{check.id}: {check.title}",
-            f"Worksheet section {check.section}; {check.points} points by default.",
-            "",
-            f"Asks:   {fill(texts.expected, **values)}",
-            f"Judged: {fill(texts.judged, **values)}",
-            f"Ruling: {fill(texts.ruling, **values)}",
-        )
-    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
 from datetime import datetime, timezone
@@ -14,7 +13,18 @@ from lab2_grader import __version__, checks, evidence, messages, process, report
 from lab2_grader.build import build
 from lab2_grader.errors import FaultError
 from lab2_grader.lab import Rubric
-from lab2_grader.records import Build, Clock, Evidence, Record, Result, Runtime, Scene, Seconds, SubmissionFacts
+from lab2_grader.records import (
+    Build,
+    Clock,
+    Evidence,
+    Record,
+    Result,
+    Runtime,
+    Scene,
+    Seconds,
+    Submission,
+    SubmissionFacts,
+)
 from lab2_grader.ros import Ros
 from lab2_grader.score import score
 from lab2_grader.stage import Stage, entry
@@ -25,7 +35,7 @@ Progress = Callable[[str], None]
 Publish = Callable[[Result, Evidence, str], None]
 
 
-class Means(Record):
+class Means(Record, frozen=True):
     """With what submissions are graded.
 
     Args:
@@ -76,22 +86,48 @@ def grade(
         progress("taking the submission over")
         taken = submission.take(source, scratch / "package")
         folder = out(taken.facts.name) if callable(out) else out
-        record = _Recorder(folder, means, taken.facts, began, publish)
-        try:
-            (scratch / "build").mkdir()
-            with Stage(means.ros, means.isolation, record.writer, scratch, means.clock) as stage:
-                record.stage("build")
-                progress("building with colcon")
-                built = build(taken, scratch / "build", means.ros, means.isolation)
-                record.built(built)
-                if built.ok:
-                    record.stage("scenes")
-                    progress("launching, listening, talking")
-                    record.played(stage.play(built, scratch / "build"))
-        except FaultError as fault:
-            record.failed(fault)
-        progress("judging")
-        return record.finish(), folder
+        return grade_taken(taken, scratch, folder, means, progress, began, publish), folder
+
+
+def grade_taken(
+    taken: Submission,
+    scratch: Path,
+    folder: Path,
+    means: Means,
+    progress: Progress,
+    began: float | None = None,
+    publish: Publish = _to_nobody,
+) -> Result:
+    """Grade a submission that was taken over already.
+
+    Args:
+        taken: The package and what is known of it.
+        scratch: A private folder, to be removed by the caller.
+        folder: Where the result goes.
+        means: With what.
+        progress: Told in a few words what begins.
+        began: When the work on it began, on the monotonic clock; None for now.
+        publish: As for `grade`.
+
+    Raises:
+        OSError: The folder for the result cannot be written.
+    """
+    record = _Recorder(folder, means, taken.facts, time.monotonic() if began is None else began, publish)
+    try:
+        (scratch / "build").mkdir()
+        with Stage(means.ros, means.isolation, record.writer, scratch, means.clock) as stage:
+            record.stage("build")
+            progress("building with colcon")
+            built = build(taken, scratch / "build", means.ros, means.isolation)
+            record.built(built)
+            if built.ok:
+                record.stage("scenes")
+                progress("launching, listening, talking")
+                record.played(stage.play(built, scratch / "build"))
+    except FaultError as fault:
+        record.failed(fault)
+    progress("judging")
+    return record.finish()
 
 
 def rescore(folder: Path, rubric: Rubric) -> Result:
@@ -179,4 +215,4 @@ class _Recorder:
 
 def results_folder(results: Path, name: str) -> Path:
     """Where the result of the submission *name* goes below *results*."""
-    return results / (os.path.basename(name) or "submission")
+    return results / (Path(name).name or "submission")

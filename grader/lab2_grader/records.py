@@ -27,15 +27,16 @@ class Row(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
 # --- processes ----------------------------------------------------------------------------------
 
 
-class Limits(Record):
+class Limits(Record, frozen=True):
     """What one run of a process and all its descendants may use.
 
     Args:
         seconds: Wall-clock time before it is stopped.
-        output_bytes: How much of its output is kept, both streams together.
+        output_bytes: How much of each of its two streams of output is kept.
         processes: Processes and threads at once; 0 for no limit.
         memory_bytes: Resident memory of all together; 0 for no limit.
         file_bytes: Size of any one file it writes; 0 for no limit.
+        cpu_seconds: Time on processors of all together; 0 for no limit.
     """
 
     seconds: float
@@ -43,9 +44,10 @@ class Limits(Record):
     processes: int = 0
     memory_bytes: int = 0
     file_bytes: int = 0
+    cpu_seconds: float = 0
 
 
-class Request(Record):
+class Request(Record, frozen=True):
     """A process to be started: the only way in which this package starts one.
 
     Args:
@@ -70,14 +72,14 @@ class EndedBy(str, Enum):
     LIMIT = "limit"  # it used more than it may of something else
 
 
-class Outcome(Record):
+class Outcome(Record, frozen=True):
     """How a process ended.
 
     Args:
         code: Exit code; None when a signal ended it.
         signal: Number of the signal that ended it; None when it exited.
         ended_by: Who ended it.
-        limit: Which limit was struck (`memory`, `processes`, …) when `ended_by` is LIMIT, else empty.
+        limit: Which limit was struck (`seconds`, `memory`, `processes`, `cpu`) when `ended_by` is LIMIT, else empty.
         stdout: What was kept of standard output.
         stderr: What was kept of standard error.
         dropped_bytes: Output beyond the limit, thrown away.
@@ -97,14 +99,14 @@ class Outcome(Record):
 # --- submission ---------------------------------------------------------------------------------
 
 
-class SourceFile(Record):
+class SourceFile(Record, frozen=True):
     """A text file of the package, kept so that hints can name lines; `path` is relative to the package."""
 
     path: str
     text: str
 
 
-class GitFacts(Record):
+class GitFacts(Record, frozen=True):
     """What the repository whose top folder is the submission says of itself.
 
     Args:
@@ -128,7 +130,7 @@ class GitFacts(Record):
     committed: str = ""
 
 
-class SubmissionFacts(Record):
+class SubmissionFacts(Record, frozen=True):
     """What was handed in, as far as it concerns the verdicts.
 
     Args:
@@ -150,7 +152,7 @@ class SubmissionFacts(Record):
     sources: tuple[SourceFile, ...]
 
 
-class Submission(Record):
+class Submission(Record, frozen=True):
     """A package found and taken over, ready to be built.
 
     Args:
@@ -165,14 +167,14 @@ class Submission(Record):
 # --- build --------------------------------------------------------------------------------------
 
 
-class EntryPoint(Record):
+class EntryPoint(Record, frozen=True):
     """One line of `console_scripts`: `name = target`."""
 
     name: str
     target: str
 
 
-class Build(Record):
+class Build(Record, frozen=True):
     """What `colcon build` made of the package.
 
     Args:
@@ -221,14 +223,14 @@ class Clock(str, Enum):
     REAL_TIME = "real-time"
 
 
-class Phase(Row):
+class Phase(Row, frozen=True):
     """A part of the scene begins: `start`, `graph`, `period`, `slow`, `fast`, `real-time`, `send`, `stop`."""
 
     at: float
     name: str
 
 
-class Endpoint(Row):
+class Endpoint(Row, frozen=True):
     """A publisher or subscription appears in the graph, or leaves it.
 
     Args:
@@ -254,7 +256,7 @@ class Endpoint(Row):
     durability: str
 
 
-class Message(Row):
+class Message(Row, frozen=True):
     """A message arrived at the observer.
 
     Args:
@@ -272,7 +274,7 @@ class Message(Row):
     data: int | float | str | None
 
 
-class Line(Row):
+class Line(Row, frozen=True):
     """A line that a process of the submission printed.
 
     Args:
@@ -288,14 +290,14 @@ class Line(Row):
     text: str
 
 
-class Tick(Row):
+class Tick(Row, frozen=True):
     """The grader moved the ROS clock; `clock` is its new time, in seconds."""
 
     at: float
     clock: float
 
 
-class Sent(Row):
+class Sent(Row, frozen=True):
     """The grader published a message of its own."""
 
     at: float
@@ -303,7 +305,7 @@ class Sent(Row):
     data: int | str
 
 
-class ProcessSeen(Row):
+class ProcessSeen(Row, frozen=True):
     """A process of the submission was seen running; `executable` is its name when it is one of the package's, else empty."""
 
     at: float
@@ -312,7 +314,7 @@ class ProcessSeen(Row):
     command: str
 
 
-class ProcessGone(Row):
+class ProcessGone(Row, frozen=True):
     """A process seen before is no longer there; `by` says whether it ended by itself or the scene was being stopped."""
 
     at: float
@@ -320,7 +322,7 @@ class ProcessGone(Row):
     by: EndedBy
 
 
-class ProgramEnded(Row):
+class ProgramEnded(Row, frozen=True):
     """What the scene started (the launch, or the one executable) ended.
 
     Args:
@@ -338,7 +340,7 @@ class ProgramEnded(Row):
     limit: str
 
 
-class Measured(Row):
+class Measured(Row, frozen=True):
     """A number the observer worked out: `graph_seconds`, `period_seconds`, `follows_ros_clock` (1 or 0), `dropped_bytes`."""
 
     at: float
@@ -346,7 +348,7 @@ class Measured(Row):
     value: float
 
 
-class Unsupported(Row):
+class Unsupported(Row, frozen=True):
     """Our own launcher met something of the launch API that it does not know: our limit, not the student's fault."""
 
     at: float
@@ -358,7 +360,7 @@ Event = (
 )
 
 
-class ScenePlan(Record):
+class ScenePlan(Record, frozen=True):
     """What an observer is told to do.
 
     Args:
@@ -378,7 +380,7 @@ class ScenePlan(Record):
     texts: tuple[str, ...] = ()
 
 
-class Scene(Record):
+class Scene(Record, frozen=True):
     """One scene as it was played.
 
     Args:
@@ -405,14 +407,15 @@ class Scene(Record):
     def follows_own_clock(self) -> bool:
         """Whether its nodes were found not to follow the ROS clock that the grader drove."""
         return self.clock is Clock.TIME_LAPSE and any(
-            isinstance(event, Measured) and event.name == "follows_ros_clock" and event.value == 0 for event in self.events
+            isinstance(event, Measured) and event.name == "follows_ros_clock" and event.value == 0
+            for event in self.events
         )
 
 
 # --- evidence -----------------------------------------------------------------------------------
 
 
-class Runtime(Record):
+class Runtime(Record, frozen=True):
     """With what the submission was run.
 
     Args:
@@ -430,7 +433,7 @@ class Runtime(Record):
     grader: str
 
 
-class Seconds(Record):
+class Seconds(Record, frozen=True):
     """How long the stages took; `run` is all scenes, side by side."""
 
     build: float
@@ -438,7 +441,7 @@ class Seconds(Record):
     total: float
 
 
-class Evidence(Record):
+class Evidence(Record, frozen=True):
     """All that was observed of one submission. Checks see this and nothing else.
 
     Args:
@@ -478,7 +481,7 @@ class Status(str, Enum):
     INCONCLUSIVE = "inconclusive"
 
 
-class Verdict(Record):
+class Verdict(Record, frozen=True):
     """What one check says.
 
     Args:
@@ -506,7 +509,7 @@ class Verdict(Record):
     line: int = 0
 
 
-class CheckResult(Record):
+class CheckResult(Record, frozen=True):
     """A verdict with its points, as `result.json` has it."""
 
     id: str
@@ -526,7 +529,7 @@ class CheckResult(Record):
     line: int
 
 
-class ItemResult(Record):
+class ItemResult(Record, frozen=True):
     """An item of the worksheet's checklist with the points of its checks."""
 
     item: str
@@ -536,7 +539,7 @@ class ItemResult(Record):
     max_points: int
 
 
-class SubmissionResult(Record):
+class SubmissionResult(Record, frozen=True):
     """The submission as `result.json` names it."""
 
     name: str
@@ -545,7 +548,7 @@ class SubmissionResult(Record):
     commit: str | None
 
 
-class Digests(Record):
+class Digests(Record, frozen=True):
     """SHA-256 of what the result was made from, hexadecimal."""
 
     submission: str
@@ -553,7 +556,7 @@ class Digests(Record):
     rubric: str
 
 
-class Result(Record):
+class Result(Record, frozen=True):
     """`result.json`: the contract of DESIGN section 3.
 
     Args:

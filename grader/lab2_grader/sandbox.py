@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import os
+import platform
 import shutil
 import sys
 from pathlib import Path
@@ -34,7 +35,7 @@ SYSTEM_FILES = (
 )
 
 
-class Isolation(Record):
+class Isolation(Record, frozen=True):
     """Whether submissions are isolated; `reason` says why not, `mend` which command changes that."""
 
     on: bool
@@ -47,7 +48,7 @@ class Isolation(Record):
         return "bubblewrap" if self.on else "off"
 
 
-class Mount(Record):
+class Mount(Record, frozen=True):
     """A host path shown read-only inside; `inside` is empty when it is shown under its own name."""
 
     host: str
@@ -80,9 +81,16 @@ def private_network(request: Request, isolation: Isolation) -> Request:
         # The machine's own /proc, writable: the kernel lets the inner wall mount a /proc only where this one is
         # untouched, and the inner wall's user map is written through it. Only the observer runs here.
         *("--ro-bind", "/", "/", "--bind", "/proc", "/proc", "--dev", "/dev"),
+        *_control_groups(),
         *("--chdir", request.cwd, "--", *request.argv),
     )
     return msgspec.structs.replace(request, argv=argv, cwd="/")
+
+
+def _control_groups() -> tuple[str, ...]:
+    """What lets the observer keep the limits of what it starts; the inner wall shows nothing of it."""
+    base = process.control_groups()
+    return tuple(part for path in base.paths() for part in ("--bind", path, path)) if base else ()
 
 
 def confine(
@@ -107,27 +115,64 @@ def confine(
     argv = [
         *("bwrap", "--die-with-parent", "--new-session", "--unshare-user", "--unshare-pid", "--unshare-ipc"),
         *("--unshare-uts", "--unshare-cgroup-try", "--hostname", "lab2", "--cap-drop", "ALL"),
-        *("--ro-bind", "/usr", "/usr", "--proc", "/proc", "--dev", "/dev"),
+        *_no_further_namespaces(),
+        # A submission that is run by root has root's user id outside, which is enough to write below /proc/sys.
+        *("--ro-bind", "/usr", "/usr", "--proc", "/proc", "--remount-ro", "/proc", "--dev", "/dev"),
         *("--size", scratch, "--tmpfs", "/dev/shm", "--size", scratch, "--tmpfs", "/tmp"),
-        *("--size", scratch, "--tmpfs", HOME),
+        *("--size", scratch, "--tmpfs", HOME, "--remount-ro", "/dev"),
     ]
     if not network:
         argv.append("--unshare-net")
     if workspace_bytes:
         argv += ["--size", str(workspace_bytes), "--tmpfs", WORKSPACE]
     for name in ("/bin", "/sbin", "/lib", "/lib32", "/lib64"):
-        if os.path.islink(name):
-            argv += ["--symlink", os.readlink(name), name]
-        elif os.path.isdir(name):
+        if Path(name).is_symlink():
+            argv += ["--symlink", str(Path(name).readlink()), name]
+        elif Path(name).is_dir():
             argv += ["--ro-bind", name, name]
     for name in SYSTEM_FILES:
         argv += ["--ro-bind-try", name, name]
     for mount in (*interpreter_mounts(), *mounts):
         argv += ["--ro-bind", mount.host, mount.inside or mount.host]
     for hidden in own_files():
-        argv += ["--tmpfs", hidden]
-    argv += ["--remount-ro", "/", "--chdir", request.cwd, "--", *request.argv]
+        argv += ["--tmpfs", hidden, "--remount-ro", hidden]
+    argv += ["--remount-ro", "/", "--chdir", request.cwd, "--", *_few_processes(request.limits), *request.argv]
     return msgspec.structs.replace(request, argv=tuple(argv), cwd="/")
+
+
+@functools.cache
+def _no_further_namespaces() -> tuple[str, ...]:
+    """Keeps a submission from making namespaces of its own, where this bubblewrap can (0.8 and later)."""
+    outcome = process.run(Request(("bwrap", "--help"), process.environment("PATH"), "/", Limits(seconds=10)))
+    return ("--disable-userns",) if b"--disable-userns" in outcome.stdout + outcome.stderr else ()
+
+
+def _few_processes(limits: Limits) -> tuple[str, ...]:
+    """The kernel's own limit of processes for an ordinary user without control groups.
+
+    Since Linux 5.14 it counts those of one user namespace apart, so that it is this submission's alone. It is set a
+    little above the limit, so that whoever watches the tree sees it struck. For root it does not count.
+    """
+    release = tuple(int(part) for part in platform.release().split("-")[0].split(".")[:2] if part.isdigit())
+    if not limits.processes or process.control_groups() or os.geteuid() == 0 or release < (5, 14):
+        return ()
+    return ("prlimit", f"--nproc={limits.processes + 16}", "--")
+
+
+def limits_kept_by() -> str:
+    """By what means memory and processes of a submission are limited here, as a sentence for people."""
+    base = process.control_groups()
+    if base:
+        return f"Memory, processors and processes of a submission are limited by the kernel (control groups, version {base.version})."
+    processes = (
+        "the kernel (a limit of its user namespace)"
+        if _few_processes(Limits(0, processes=1))
+        else "the grader, which looks ten times a second"
+    )
+    return (
+        f"No control group can be made here: processes are limited by {processes}, memory and processors by the grader, "
+        "which looks ten times a second and does not see files in memory."
+    )
 
 
 @functools.cache

@@ -32,12 +32,26 @@ from lab2_grader.records import (
     ScenePlan,
 )
 from lab2_grader.ros import Ros
+from lab2_grader.ros.domains import Domain
 
 INSTALLED = f"{sandbox.WORKSPACE}/install"
 OBSERVER_OUTPUT_BYTES = 40_000_000
 OBSERVER_GRACE_SECONDS = 30.0
 EARLY_OBSERVERS = 3  # conversation, listener, originals: what a normal submission needs
-WORDS = ("amber", "birch", "cobalt", "delta", "ember", "fjord", "garnet", "heron", "indigo", "juniper", "kestrel", "lilac")
+WORDS = (
+    "amber",
+    "birch",
+    "cobalt",
+    "delta",
+    "ember",
+    "fjord",
+    "garnet",
+    "heron",
+    "indigo",
+    "juniper",
+    "kestrel",
+    "lilac",
+)
 
 # Runs a module's main without its entry point: for a package whose setup.py does not name it.
 RUN_MODULE = (
@@ -53,15 +67,16 @@ class _Observer:
 
     def __init__(self, ros: Ros, isolation: sandbox.Isolation, home: Path) -> None:
         self._sink: Callable[[bytes], object] | None = None
-        self._early: list[bytes] = []
         self._errors = bytearray()
-        environment = dict(ros.environment(str(home)))
+        self._domain = None if isolation.on else Domain()
+        self._world = self._domain.environment() if self._domain else ()
+        environment = dict(ros.environment(str(home)) + self._world)
         here = str(Path(__file__).parent.parent)
         environment["PYTHONPATH"] = ":".join(filter(None, (here, environment.get("PYTHONPATH", ""))))
         conversation = lab.limits().conversation
         seconds = conversation.realtime_seconds + conversation.timelapse_seconds + OBSERVER_GRACE_SECONDS
         request = Request(
-            argv=(sys.executable, "-P", "-m", "lab2_grader.observe"),
+            argv=(sys.executable, "-m", "lab2_grader.observe"),
             env=tuple(environment.items()),
             cwd="/",
             limits=Limits(seconds=seconds, output_bytes=OBSERVER_OUTPUT_BYTES),
@@ -79,7 +94,8 @@ class _Observer:
         began = time.monotonic()
         with path.open("wb", buffering=0) as file:
             self._sink = file.write
-            self._process.send(msgspec.json.encode(plan) + b"\n")
+            program = msgspec.structs.replace(plan.program, env=plan.program.env + self._world)
+            self._process.send(msgspec.json.encode(msgspec.structs.replace(plan, program=program)) + b"\n")
             outcome = self._process.wait()
         complete = outcome.code == 0 and not outcome.dropped_bytes
         fault = ""
@@ -96,6 +112,8 @@ class _Observer:
         if self._process.running:
             self._process.stop(EndedBy.GRADER)
             self._process.wait()
+        if self._domain is not None:
+            self._domain.close()
 
 
 class Stage:
@@ -124,7 +142,7 @@ class Stage:
         self._writer = writer
         self._home = home
         self._clock = clock
-        self._random = random.Random(seed)
+        self._random = random.Random(seed)  # noqa: S311 - numbers to look for, no secrets
         self._observers: list[_Observer] = []
         self._waiting = [self._observer() for _ in range(EARLY_OBSERVERS)]
 
@@ -249,7 +267,10 @@ class Stage:
         conversation, resources = lab.limits().conversation, lab.limits().resources
         seconds = conversation.realtime_seconds + conversation.timelapse_seconds
         request = Request(
-            argv=argv, env=self._ros.environment(home, self._prefix(installed)), cwd=home, limits=resources.limits(seconds)
+            argv=argv,
+            env=self._ros.environment(home, self._prefix(installed)),
+            cwd=home,
+            limits=resources.limits(seconds),
         )
         mounts = (
             sandbox.Mount(str(installed / "install"), INSTALLED),
@@ -283,7 +304,9 @@ def _shows_talker(scene: Scene) -> bool:
     speakers = [
         (event.node, event.topic)
         for event in scene.events
-        if isinstance(event, Endpoint) and event.event == "appeared" and event.kind == "publisher"
+        if isinstance(event, Endpoint)
+        and event.event == "appeared"
+        and event.kind == "publisher"
         and event.topic in topics
     ]
     heard = any(isinstance(event, Message) and event.topic == topics[0] for event in scene.events)

@@ -26,7 +26,7 @@ ELLIPSIS = "…"
 
 
 def clean(text: str, limit: int, *, lines: bool = False) -> str:
-    """*text* on one line, without anything invisible or executable by a terminal, at most *limit* characters long.
+    r"""*text* on one line, without anything invisible or executable by a terminal, at most *limit* characters long.
 
     Terminal sequences, control characters, bidirectional controls and other invisible formatting go; tabs and line ends
     become spaces; lone surrogates become U+FFFD. What is too long ends in an ellipsis. It is not escaped for HTML,
@@ -35,7 +35,7 @@ def clean(text: str, limit: int, *, lines: bool = False) -> str:
     Args:
         text: Whatever a submission brought.
         limit: How many characters to keep, at least 1.
-        lines: Keep line ends, as `\\n`.
+        lines: Keep line ends, as `\n`.
     """
     if not text.isprintable():  # true for nearly all text there is, and quick
         text = _SEQUENCES.sub("", text)

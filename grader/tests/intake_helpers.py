@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 
-from lab2_grader import submission
+from lab2_grader import lab, submission
 from lab2_grader.errors import RefusedError
 
 MANIFEST = """<?xml version="1.0"?>
@@ -76,8 +79,18 @@ def refused(source: Path | str, into: Path, **options: object) -> RefusedError:
     return caught.value
 
 
-def git(folder: Path, *arguments: str, when: str = "2026-10-05T12:00:00+0000") -> str:
-    """Run git in *folder* as a student would."""
+@contextlib.contextmanager
+def limited(monkeypatch: pytest.MonkeyPatch, **values: float) -> Iterator[None]:
+    """Other limits of intake than the lab's."""
+    all_limits = lab.limits()
+    changed = msgspec.structs.replace(all_limits, intake=msgspec.structs.replace(all_limits.intake, **values))
+    with monkeypatch.context() as patch:
+        patch.setattr(lab, "limits", lambda: changed)
+        yield
+
+
+def git(folder: Path, *arguments: str, when: str = "2026-10-05T12:00:00+0000", text: str = "") -> str:
+    """Run git in *folder* as a student would; *text* is its standard input."""
     environment = {
         "PATH": os.environ["PATH"],
         "HOME": str(folder),
@@ -89,7 +102,10 @@ def git(folder: Path, *arguments: str, when: str = "2026-10-05T12:00:00+0000") -
         "GIT_AUTHOR_DATE": when,
         "GIT_COMMITTER_DATE": when,
     }
-    done = subprocess.run(["git", *arguments], cwd=folder, env=environment, capture_output=True, text=True)
+    command = ["git", *arguments]
+    done = subprocess.run(
+        command, cwd=folder, env=environment, input=text, check=False, capture_output=True, encoding="utf-8"
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 

@@ -14,16 +14,17 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from intake_helpers import MANIFEST, PACKAGE_FILES, listing, refused, write, write_package
+from intake_helpers import MANIFEST, PACKAGE_FILES, limited, listing, refused, write, write_package
 
-from lab2_grader import lab
 from lab2_grader.errors import FaultError, RefusedError, UsageError
 from lab2_grader.submission import take
 
 # --- finding the package ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("where", [".", "lab2", "src/lab2", "ros2_ws/src/lab2", "home/me/ros2_ws/src/my-copy", "anything"])
+@pytest.mark.parametrize(
+    "where", [".", "lab2", "src/lab2", "ros2_ws/src/lab2", "home/me/ros2_ws/src/my-copy", "anything"]
+)
 def test_found_by_its_name_wherever_it_is(tmp_path: Path, where: str) -> None:
     write_package(tmp_path / "in" / where)
     taken = take(str(tmp_path / "in"), tmp_path / "out")
@@ -63,7 +64,8 @@ def test_two_packages_are_refused_naming_both(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "folder", ["build/lab2", "install/lab2/share/lab2", "log", "__pycache__", ".git/x", "node_modules/x", ".venv/x", "__MACOSX"]
+    "folder",
+    ["build/lab2", "install/lab2/share/lab2", "log", "__pycache__", ".git/x", "node_modules/x", ".venv/x", "__MACOSX"],
 )
 def test_build_products_are_never_searched(tmp_path: Path, folder: str) -> None:
     write_package(tmp_path / "in/src/lab2")
@@ -263,16 +265,6 @@ def test_the_result_may_lie_inside_the_submission(tmp_path: Path) -> None:
 
 
 # --- limits ----------------------------------------------------------------------------------------
-
-
-@contextlib.contextmanager
-def limited(monkeypatch: pytest.MonkeyPatch, **values: float) -> Iterator[None]:
-    """Other limits of intake than the lab's."""
-    all_limits = lab.limits()
-    changed = msgspec.structs.replace(all_limits, intake=msgspec.structs.replace(all_limits.intake, **values))
-    with monkeypatch.context() as patch:
-        patch.setattr(lab, "limits", lambda: changed)
-        yield
 
 
 def test_a_hundred_thousand_files_are_refused_by_count(tmp_path: Path) -> None:

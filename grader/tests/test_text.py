@@ -54,7 +54,9 @@ def test_line_ends_are_kept_when_asked_for() -> None:
 
 def test_whatever_comes_only_harmless_characters_are_left() -> None:
     draw = random.Random(7)
-    alphabet = [chr(point) for point in (*range(0x250), 0x061C, *range(0x2000, 0x2070), 0xD800, 0xFEFF, 0xFFFF, 0xE0001)]
+    alphabet = [
+        chr(point) for point in (*range(0x250), 0x061C, *range(0x2000, 0x2070), 0xD800, 0xFEFF, 0xFFFF, 0xE0001)
+    ]
     for _ in range(500):
         text = clean("".join(draw.choices(alphabet + ["\x1b[", "\x1b]", "\x9d"] * 20, k=60)), 40)
         assert len(text) <= 40

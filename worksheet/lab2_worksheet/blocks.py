@@ -13,6 +13,7 @@ from typing import Any
 from jinja2 import Environment
 from lab2_grader import lab
 from lab2_grader.lab import RubricCheck
+from lab2_grader.messages import catalogue
 from lab2_grader.sections import section_anchor
 from markupsafe import Markup
 
@@ -36,6 +37,27 @@ def _command(key: str) -> Command:
 def checks_of(section: str) -> tuple[RubricCheck, ...]:
     """The rubric's checks of a section, in the rubric's order."""
     return tuple(check for check in lab.rubric().check if check.section == section)
+
+
+def judged(check: RubricCheck) -> str:
+    """How a check is judged, and the ruling where the worksheet is silent: the words of the grader's own catalogue."""
+    spec = lab.specification()
+    about_text = check.id in ("talker-chatter", "listener-chatter", "originals-kept")
+    topic = spec.text_topic.name if about_text else spec.number_topic.name
+    number = spec.number_topic
+    names = {
+        "package": spec.package,
+        "topic": f"`{topic}`",
+        "smallest": number.smallest,
+        "largest": number.largest,
+        "before": number.largest - 1,
+        "above": number.largest + 1,
+        "file": f"`{spec.original.launch_file}`",
+        "talker": f"`{spec.original.talker}`",
+        "listener": f"`{spec.original.listener}`",
+    }
+    texts = catalogue().check[check.id]
+    return f"{texts.judged} {texts.ruling}".format_map(names)
 
 
 class MarkdownBlocks:
@@ -196,7 +218,7 @@ class HtmlBlocks:
             [markdown.html(hint) for hint in task.hints],
             tries,
             markdown.html(task.expect),
-            checks_of(task.section),
+            self._checks(task.section),
         )
         staff = self._staff_task(task) if self._staff else ""
         return self._keep(block + staff)
@@ -214,7 +236,10 @@ class HtmlBlocks:
 
     def points(self, section: str) -> Markup:
         """The checks of a section, with what they are worth."""
-        return self._keep(self._templates.checks(checks_of(section)))
+        return self._keep(self._templates.checks(self._checks(section)))
+
+    def _checks(self, section: str) -> list[tuple[RubricCheck, Markup]]:
+        return [(check, markdown.inline(judged(check))) for check in checks_of(section)]
 
     def questions(self, section: str) -> Markup:
         """The questions that stand at the end of a section."""
@@ -222,7 +247,7 @@ class HtmlBlocks:
         if not chosen:
             raise SourceError(f"questions.toml has no question after {section}.")
         self._used.update(f"question:{question.id}" for question in chosen)
-        return self._keep(self._templates.questions(chosen, markdown.inline))
+        return self._keep(self._templates.questions(section, chosen, markdown.inline))
 
     def done(self, key: str, label: str) -> Markup:
         """A box to tick, kept in the browser; *key* is its name there and never changes."""
@@ -285,10 +310,11 @@ class HtmlBlocks:
 
 
 def _by_terminal(keys: tuple[str, ...]) -> list[tuple[str, ...]]:
-    """*keys* in runs that share a terminal."""
+    """*keys* in runs that share a terminal, none beyond a command that keeps running."""
     groups: list[tuple[str, ...]] = []
     for key in keys:
-        if groups and _command(groups[-1][-1]).terminal == _command(key).terminal:
+        last = _command(groups[-1][-1]) if groups else None
+        if last and last.terminal == _command(key).terminal and not last.keeps_running:
             groups[-1] += (key,)
         else:
             groups.append((key,))

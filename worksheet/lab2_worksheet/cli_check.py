@@ -76,7 +76,9 @@ def _problems(words: list[str]) -> list[str]:
         return _ros2(arguments, options)
     if program == "colcon":
         known = _COLCON.get(arguments[0], ()) if arguments else ()
-        return [] if not arguments else _options("colcon build", options, recording().colcon if known is None else known)
+        return (
+            [] if not arguments else _options("colcon build", options, recording().colcon if known is None else known)
+        )
     if program == "git":
         if arguments and arguments[0] not in _GIT:
             return [f"git {arguments[0]} is not among the git commands that the worksheet uses."]

@@ -87,6 +87,7 @@ def count() -> str:
         "again: a saw-tooth.",
         width=420,
         height=190,
+        key=False,
     )
 
 
@@ -111,7 +112,9 @@ def around_the_reset() -> str:
                 "Int8 rolls over, silently",
                 Mark.WRONG,
             ),
-            Strip("Reset to the wrong number", right(high - 2, high - 1, high) + wrong(low + 1, low + 2), "", Mark.WRONG),
+            Strip(
+                "Reset to the wrong number", right(high - 2, high - 1, high) + wrong(low + 1, low + 2), "", Mark.WRONG
+            ),
         ],
         id_prefix="picture-reset",
         title=f"The numbers around {high}",

@@ -20,7 +20,7 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Base of the records below: frozen, and an unknown key is refused."""
 
 
-class Command(Record):
+class Command(Record, frozen=True):
     """A command of the worksheet.
 
     Args:
@@ -48,21 +48,21 @@ class Command(Record):
     not_played: str = ""
 
 
-class Fault(Record):
+class Fault(Record, frozen=True):
     """A common fault: what it is, and in how many of the submissions that were read; 0 when it was not counted."""
 
     text: str
     seen: int = 0
 
 
-class Change(Record):
+class Change(Record, frozen=True):
     """A file of the solution and the file of the template it began as; empty when it is new."""
 
     file: str
     began_as: str
 
 
-class Task(Record):
+class Task(Record, frozen=True):
     """A part of the exercise.
 
     Args:
@@ -90,7 +90,7 @@ class Task(Record):
     faults: tuple[Fault, ...]
 
 
-class Option(Record):
+class Option(Record, frozen=True):
     """An answer that can be chosen, and why it is right or wrong."""
 
     text: str
@@ -98,24 +98,24 @@ class Option(Record):
     right: bool = False
 
 
-class Question(Record):
+class Question(Record, frozen=True):
     """A question to check oneself with; `after` is the section at whose end it stands."""
 
     id: str
     after: str
     ask: str
-    options: tuple[Option, ...]
+    option: tuple[Option, ...]
 
 
-class _Commands(Record):
+class _Commands(Record, frozen=True):
     command: tuple[Command, ...]
 
 
-class _Tasks(Record):
+class _Tasks(Record, frozen=True):
     task: tuple[Task, ...]
 
 
-class _Questions(Record):
+class _Questions(Record, frozen=True):
     question: tuple[Question, ...]
 
 
@@ -132,7 +132,7 @@ def facts() -> dict[str, object]:
 
 @functools.cache
 def _plain() -> Environment:
-    return Environment(undefined=StrictUndefined, autoescape=False)  # noqa: S701 - fills TOML, escaped when shown
+    return Environment(undefined=StrictUndefined, autoescape=False)  # fills TOML; escaped when it is shown
 
 
 def fill(text: str, where: str) -> str:
@@ -190,6 +190,6 @@ def questions() -> dict[str, Question]:
     path = SOURCE / "questions.toml"
     found = _by_id(path, _read(path, _Questions).question)
     for question in found.values():
-        if sum(option.right for option in question.options) != 1 or not all(o.reason for o in question.options):
+        if sum(option.right for option in question.option) != 1 or not all(o.reason for o in question.option):
             raise SourceError(f"{path.name}: {question.id} needs one right answer, and a reason for each answer.")
     return found

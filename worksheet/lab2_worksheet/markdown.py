@@ -22,22 +22,19 @@ def _parser() -> MarkdownIt:
     parser = MarkdownIt("commonmark", {"html": True, "typographer": True, "quotes": "“”‘’"})
     parser.enable(["table", "smartquotes"])
     parser.add_render_rule("heading_open", _heading_open)
-    parser.add_render_rule("table_open", lambda *_: '<div class="scroll" tabindex="0" role="group" aria-label="Table"><table>')
+    parser.add_render_rule(
+        "table_open", lambda *_: '<div class="scroll" tabindex="0" role="group" aria-label="Table"><table>'
+    )
     parser.add_render_rule("table_close", lambda *_: "</table></div>\n")
     return parser
 
 
-def _heading_open(
-    self: RendererHTML, tokens: Sequence[Token], index: int, options: OptionsDict, env: EnvType
-) -> str:
+def _heading_open(self: RendererHTML, tokens: Sequence[Token], index: int, options: OptionsDict, env: EnvType) -> str:
     """`## 6.1 …` gets the section's anchor; another heading gets one made of its words."""
     text = tokens[index + 1].content
     number = _NUMBER.match(text)
-    if number:
-        anchor = section_anchor(number.group(1))
-    else:
-        anchor = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
-    tokens[index].attrSet("id", anchor)
+    words = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
+    tokens[index].attrSet("id", section_anchor(number.group(1)) if number else words)
     return self.renderToken(tokens, index, options, env)
 
 

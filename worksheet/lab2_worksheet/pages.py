@@ -6,11 +6,11 @@ import base64
 import functools
 import hashlib
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from jinja2.exceptions import TemplateError
-from lab2_grader import lab
 from lab2_grader.report.pictures import PICTURE_CSS
 from markupsafe import Markup
 
@@ -74,7 +74,7 @@ def _asset(name: str) -> str:
     return (ASSETS / name).read_text(encoding="utf-8")
 
 
-def _render(env: Environment, name: str, more: dict[str, object]) -> str:
+def _render(env: Environment, name: str, more: Mapping[str, object]) -> str:
     try:
         return env.get_template(name).render({**facts(), **more})
     except TemplateError as error:
@@ -111,7 +111,6 @@ def _page(body: Markup, edition: str) -> str:
             "style": Markup(_asset("page.css") + _asset("content.css") + PICTURE_CSS),
             "script": Markup(script),
             "script_digest": digest,
-            "version": lab.course().year,
         },
     )
 

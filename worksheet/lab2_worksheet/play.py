@@ -30,7 +30,7 @@ _ASKED_AGAIN = ("ros2 node ", "ros2 topic list", "ros2 topic info")
 _DROPPED = ("ROS_HOME", "ROS_LOG_DIR", "PWD", "OLDPWD", "PYTHONDONTWRITEBYTECODE", "VIRTUAL_ENV")
 _OPTION = re.compile(r"(?<![\w-])(-\w|--[a-z][a-z-]+)")
 _VERBS = ("run", "launch", "pkg executables", "node list", "node info", "topic list", "topic info", "topic echo")
-_MORE_VERBS = ("topic hz", "topic pub", "topic type", "interface show", "daemon stop", "doctor")
+_MORE_VERBS = ("topic hz", "topic pub", "interface show", "pkg create", "daemon stop")
 
 
 @dataclass
@@ -94,7 +94,9 @@ def play(say: Callable[[str], None] = lambda text: None) -> Played:
             if command.terminal not in terminals:
                 terminals[command.terminal] = stack.enter_context(Terminal(env, str(home)))
             if command.terminal in running.values():
-                wrong.append(f"{command.id}: terminal {command.terminal} is busy; the manifest must stop what runs there.")
+                wrong.append(
+                    f"{command.id}: terminal {command.terminal} is busy; the manifest must stop what runs there."
+                )
                 break
             say(f"{command.terminal}$ {command.run}")
             terminal = terminals[command.terminal]
@@ -119,7 +121,7 @@ def play(say: Callable[[str], None] = lambda text: None) -> Played:
 
 
 def _type_and_compare(command: Command, terminal: Terminal) -> list[str]:
-    """Type *command* and compare; a question about the graph is asked again for a while, as discovery takes a moment."""
+    """Type *command* and compare. A question about the graph is asked again for a while: discovery takes a moment."""
     deadline = time.monotonic() + START_SECONDS
     while True:
         terminal.clear()

@@ -14,7 +14,7 @@ from lab2_worksheet.manifest import Record
 from lab2_worksheet.places import RECORDED
 
 
-class Recording(Record):
+class Recording(Record, frozen=True):
     """A whole session.
 
     Args:
@@ -40,6 +40,7 @@ _CHANGES = (
     (re.compile(r"(All log files can be found below) \S+"), r"\1 ~/.ros/log/<date and time>"),
     (re.compile(r"object at 0x[0-9a-f]+"), "object at <address>"),
     (re.compile(r"\[\d+\.\d+s\]"), "[<seconds>s]"),
+    (re.compile(r"RIHS01_[0-9a-f]+"), "RIHS01_<number>"),
     (re.compile(r"GID: [0-9a-f.]+"), "GID: <number>"),
     (re.compile(r"\[main [0-9a-f]{7,}\]"), "[main <id>]"),
 )

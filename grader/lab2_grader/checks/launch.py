@@ -79,9 +79,9 @@ def launch_only_numeric(view: View, earlier: Earlier) -> Verdict:
     if not started or launch_error(scene):
         return blocked(check, "launch-starts")
     # Two of one in the place of the other is one fault, and launch-starts has it.
-    if twice := [name for name in numeric if started.get(name, 0) > 1 and not _respawned(scene, name)]:
-        if all(name in started for name in numeric):
-            return failed(check, "twice", others=names(twice))
+    twice = [name for name in numeric if started.get(name, 0) > 1 and not _respawned(scene, name)]
+    if twice and all(name in started for name in numeric):
+        return failed(check, "twice", others=names(twice))
     return passed(check)
 
 

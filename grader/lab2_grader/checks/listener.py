@@ -70,7 +70,8 @@ def listener_chatter(view: View, earlier: Earlier) -> Verdict:
 
 def _sent(scene: SceneView, topic: str) -> list[Sent]:
     """What was sent there once both sides had found each other; before that nothing counts."""
-    begin = scene.phases.get("send", float("inf"))
+    found = [endpoint.at for endpoint in scene.appeared("subscription") if endpoint.topic == topic]
+    begin = max(scene.phases.get("send", float("inf")), min(found, default=0.0))
     return [row for row in scene.sent if row.topic == topic and row.at >= begin]
 
 

@@ -8,6 +8,8 @@ from lab2_grader import messages
 from lab2_grader.checks.view import View
 from lab2_grader.records import Evidence, SceneName
 
+PARTICIPANT = 24  # hexadecimal digits of a gid that name the participant (DDSI-RTPS 9.3.1)
+
 
 def notes(evidence: Evidence) -> tuple[str, ...]:
     """The notes on *evidence*, a sentence each."""
@@ -36,17 +38,15 @@ def _print(view: View) -> list[str]:
 
 
 def _names(view: View) -> list[str]:
+    """One name for nodes of two processes: the first half of an endpoint's identity is that of its process."""
     scene = view.scene(SceneName.CONVERSATION)
     if scene is None:
         return []
-    running = {process.executable for process in scene.seen}
-    owners = Counter(
-        (endpoint.node, endpoint.topic, endpoint.kind) for endpoint in scene.endpoints if endpoint.event == "appeared"
-    )
-    nodes = {node for node, _, _ in owners}
-    if len(running) > 1 and len(nodes) == 1:
-        return [messages.note("same-name", node=nodes.pop())]
-    return []
+    owners = {
+        (endpoint.node, endpoint.gid[:PARTICIPANT]) for endpoint in scene.endpoints if endpoint.event == "appeared"
+    }
+    shared = [node for node, count in Counter(node for node, _ in owners).items() if count > 1]
+    return [messages.note("same-name", node=node) for node in shared[:1]]
 
 
 def _stand_ins(view: View) -> list[str]:
@@ -56,7 +56,9 @@ def _stand_ins(view: View) -> list[str]:
     for name, program in wanted.items():
         scene = view.scene(name)
         if scene is not None and (scene.scene.started_with != "executable" or scene.scene.label != program):
-            found.append(messages.note("stand-in", name=program, used=f"the {scene.scene.started_with} {scene.scene.label}"))
+            found.append(
+                messages.note("stand-in", name=program, used=f"the {scene.scene.started_with} {scene.scene.label}")
+            )
     return found
 
 

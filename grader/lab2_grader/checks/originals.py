@@ -28,7 +28,9 @@ def originals_kept(view: View, earlier: Earlier) -> Verdict:
     printed = [
         message
         for message in texts
-        if any(str(message.data) in line.text for line in scene.lines_of(original.listener) if line.at >= message.at - 0.05)
+        if any(
+            str(message.data) in line.text for line in scene.lines_of(original.listener) if line.at >= message.at - 0.05
+        )
     ]
     started = scene.started()
     missing = [name for name in pair if name not in started]
@@ -38,7 +40,11 @@ def originals_kept(view: View, earlier: Earlier) -> Verdict:
         return blocked(check, "entry-points")
     if missing:
         error = launch_error(scene)
-        return failed(check, "launch-error", error=error) if error else failed(check, "not-started", missing=names(missing))
+        return (
+            failed(check, "launch-error", error=error)
+            if error
+            else failed(check, "not-started", missing=names(missing))
+        )
     for name in pair:
         if scene.ended_by_itself(name):
             return failed(check, "died", name=name, error=scene.error_of(name))

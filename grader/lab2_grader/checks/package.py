@@ -76,9 +76,4 @@ def _function_is_missing(view: View, name: str, target: str) -> bool:
     """Whether the executable was run and said that its module has no such function."""
     module, _, function = target.partition(":")
     said = f"module '{module.strip()}' has no attribute '{function.strip()}'"
-    return any(
-        said in line.text
-        for scene in view.scenes()
-        for line in scene.lines
-        if line.source == name
-    )
+    return any(said in line.text for scene in view.scenes() for line in scene.lines if line.source == name)

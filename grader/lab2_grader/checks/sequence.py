@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 
 from lab2_grader.records import Message, Record
 
 SHOWN = 4  # numbers shown on either side of a place in the sequence
 
 
-class Step(Record):
+class Step(Record, frozen=True):
     """Two numbers published one directly after the other; `index` is the place of the second in the sequence."""
 
     index: int
@@ -27,7 +28,7 @@ class Step(Record):
         return self.after - self.before
 
 
-class Sequel(Record):
+class Sequel(Record, frozen=True):
     """A sequence taken apart.
 
     Args:
@@ -71,7 +72,7 @@ def analyse(messages: Sequence[Message], largest: int) -> Sequel | None:
         return None
     numbers = tuple(value for value in values if value is not None)
     counted = [message.number for message in messages]
-    steady = all(later > earlier for earlier, later in zip(counted, counted[1:], strict=False))
+    steady = all(later > earlier for earlier, later in pairwise(counted))
     rises, returns, stays = [], [], []
     falling = False
     for index in range(1, len(numbers)):
@@ -90,7 +91,7 @@ def analyse(messages: Sequence[Message], largest: int) -> Sequel | None:
     return Sequel(numbers, first, tuple(rises), tuple(returns), tuple(stays))
 
 
-def whole(data: int | float | str | None) -> int | None:
+def whole(data: float | str | None) -> int | None:
     """*data* as a whole number: itself, a float without a fraction, a text that is nothing but a number; else None."""
     if isinstance(data, bool) or data is None:
         return None
@@ -99,7 +100,9 @@ def whole(data: int | float | str | None) -> int | None:
     if isinstance(data, float):
         return int(data) if data.is_integer() else None
     text = data.strip()
-    return int(text) if len(text) < 12 and text.removeprefix("-").isascii() and text.removeprefix("-").isdigit() else None
+    return (
+        int(text) if len(text) < 12 and text.removeprefix("-").isascii() and text.removeprefix("-").isdigit() else None
+    )
 
 
 def around(values: Sequence[int], index: int, shown: int = SHOWN) -> str:

@@ -58,9 +58,9 @@ def _talker(view: View) -> tuple[str, ast.AST | None]:
         return path, None
 
 
-def _walk(tree: ast.AST | None) -> Iterator[ast.AST]:
-    """All nodes in the order in which they stand in the file."""
-    nodes = [node for node in ast.walk(tree) if hasattr(node, "lineno")] if tree else []
+def _walk(tree: ast.AST | None) -> Iterator[ast.stmt | ast.expr]:
+    """All statements and expressions, in the order in which they stand in the file."""
+    nodes = [node for node in ast.walk(tree) if isinstance(node, ast.stmt | ast.expr)] if tree else []
     return iter(sorted(nodes, key=lambda node: (node.lineno, node.col_offset)))
 
 

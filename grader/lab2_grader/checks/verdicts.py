@@ -29,7 +29,7 @@ def known(check: str) -> dict[str, messages.Value]:
         "topic": topic.name,
         "name": topic.name.lstrip("/"),
         "type": topic.type,
-        "wanted": ", ".join((numeric.talker, numeric.listener, original.talker, original.listener)),
+        "wanted": f"{numeric.talker}, {numeric.listener}, {original.talker}, {original.listener}",
     }
 
 
@@ -76,3 +76,19 @@ def inconclusive(check: str, key: str, **values: messages.Value) -> Verdict:
 
 def _expected(check: str) -> str:
     return messages.fill(messages.catalogue().check[check].expected, **known(check))
+
+
+def explanation(check: lab.RubricCheck) -> str:
+    """What *check* asks, how it is judged, what the ruling is where the worksheet is silent."""
+    texts = messages.catalogue().check[check.id]
+    values = known(check.id)
+    return "\n".join(
+        (
+            f"{check.id}: {check.title}",
+            f"Worksheet section {check.section}; {check.points} points by default.",
+            "",
+            f"Asks:   {messages.fill(texts.expected, **values)}",
+            f"Judged: {messages.fill(texts.judged, **values)}",
+            f"Ruling: {messages.fill(texts.ruling, **values)}",
+        )
+    )

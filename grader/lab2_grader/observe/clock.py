@@ -35,10 +35,12 @@ class LockStep:
     Args:
         observer: Hears what the talker publishes.
         clock: TIME_LAPSE to drive the ROS clock, REAL_TIME to leave it alone.
+        talker: The executable that ticks; once it has ended there is nothing to wait for.
     """
 
-    def __init__(self, observer: Observer, clock: Clock) -> None:
+    def __init__(self, observer: Observer, clock: Clock, talker: str) -> None:
         self._observer = observer
+        self._talker = talker
         self._limits = lab.limits().conversation
         self._drives = clock is Clock.TIME_LAPSE
         self._follows = self._drives
@@ -64,14 +66,15 @@ class LockStep:
         self._deadline = time.monotonic() + self._limits.timelapse_seconds
         if self._drives:
             self._phase("period")
-            self._find_period()
+            if not self._find_period():
+                return
         if not self._follows:
             self._begin_real_time()
         if on_slow is not None:
             self._phase("slow")
             for _ in range(self._limits.slow_ticks):
                 if not self._next_tick():
-                    break
+                    return
                 numbers = self._heard()
                 if numbers:
                     on_slow(numbers[-1])
@@ -80,7 +83,6 @@ class LockStep:
             wanted = length * self._limits.wraps + length // 8 if self._follows else length + 4
             if len(self._heard()) >= wanted:
                 break
-        self._record("follows_ros_clock", float(self._follows))
 
     # --- ticks ------------------------------------------------------------------------------
 
@@ -97,7 +99,7 @@ class LockStep:
         steps = 0
         while len(self._heard()) == before:
             now = time.monotonic()
-            if now > self._deadline or now - began > self._silence() or not self._observer.alive():
+            if now > self._deadline or now - began > self._silence() or not self._can_tick():
                 return False
             if self._follows:
                 self._advance(self._period)
@@ -108,6 +110,10 @@ class LockStep:
             if self._tardy >= TARDY_LIMIT:
                 self._begin_real_time()
         return True
+
+    def _can_tick(self) -> bool:
+        """Whether there is still somebody who could tick."""
+        return self._observer.alive() and self._talker not in self._observer.ended_executables
 
     def _silence(self) -> float:
         """How long the talker may be silent before it counts as having stopped."""
@@ -139,8 +145,11 @@ class LockStep:
 
     # --- the period, and whether the node follows -----------------------------------------
 
-    def _find_period(self) -> None:
-        """Measure the period in ROS time, twice, and see whether the node stands still when the clock does."""
+    def _find_period(self) -> bool:
+        """Measure the period in ROS time, twice, and see whether the node stands still when the clock does.
+
+        False when the talker falls silent, or ends, before that.
+        """
         self._advance(FIRST_JUMP_SECONDS)
         self._wait(len(self._heard()), FIRST_WAIT_SECONDS)
         intervals = []
@@ -148,9 +157,8 @@ class LockStep:
         for _ in range(3):
             before, began, probes = len(self._heard()), time.monotonic(), 0
             while len(self._heard()) == before:
-                if time.monotonic() - began > self._limits.silence_seconds or not self._observer.alive():
-                    self._period = self._period or 1.0
-                    return
+                if time.monotonic() - began > self._limits.silence_seconds or not self._can_tick():
+                    return False
                 self._advance(PROBE_SECONDS)
                 probes += 1
                 self._wait(before, PROBE_WAIT_SECONDS)
@@ -159,17 +167,18 @@ class LockStep:
         # The interval after the first jump may be short of a whole period, so it does not count.
         self._period = round(max(intervals[1:]) * PROBE_SECONDS, 6)
         self._follows = self._stands_still(max(HOLD_SECONDS, 1.5 * took))
+        self._record("follows_ros_clock", float(self._follows))
         self._record("period_seconds", self._period if self._follows else round(took, 2))
+        return True
 
     def _stands_still(self, seconds: float) -> bool:
         """Whether nothing comes for *seconds* while the clock does not move; a few late messages are let pass."""
-        for _ in range(UNASKED_LIMIT):
-            if not self._wait(len(self._heard()), seconds):
-                return True
-        return False
+        return any(not self._wait(len(self._heard()), seconds) for _ in range(UNASKED_LIMIT))
 
     def _begin_real_time(self) -> None:
         self._phase("real-time")
+        if self._follows:
+            self._record("follows_ros_clock", 0.0)
         self._follows = False
         self._deadline = time.monotonic() + self._limits.realtime_seconds
         self._next_clock = time.monotonic()

@@ -51,7 +51,9 @@ class Observer:
     Args:
         recorder: Where everything observed goes.
 
-    What a scene's script needs to decide what to do next is kept here too: `messages`, `lines`, `endpoints`.
+    What a scene's script needs to decide what to do next is kept here too: `messages`, `lines`, `endpoints`,
+    `nodes`, `ended_executables`; `graph_changed_at` and `busy_at` say when the graph last changed and when a process
+    was last seen to want the processor.
     """
 
     def __init__(self, recorder: Recorder) -> None:
@@ -59,7 +61,9 @@ class Observer:
         self.messages: list[Message] = []
         self.lines: list[Line] = []
         self.endpoints: dict[str, Endpoint] = {}
+        self.nodes: tuple[str, ...] = ()
         self.graph_changed_at = 0.0
+        self.busy_at = 0.0
         self.ended: ProgramEnded | None = None
         self._context = Context()
         # Without log files there is nothing that the observer must be able to write.
@@ -73,6 +77,7 @@ class Observer:
         self._program: process.Process | None = None
         self._splitters: dict[str, OutputLines] = {}
         self._processes: dict[int, str] = {}
+        self.ended_executables: frozenset[str] = frozenset()
         self._next_graph = 0.0
         self._next_processes = 0.0
         self._stopping = False
@@ -130,6 +135,8 @@ class Observer:
             return
         found = {info.pid: info for info in process.tree(self._program.pid)} if self._program.running else {}
         marker = f"/lib/{lab.specification().package}/"
+        if any(info.busy for info in found.values()):
+            self.busy_at = self.recorder.now()
         for pid, info in found.items():
             if pid not in self._processes:
                 script = next((part for part in info.command[:2] if marker in part), "")
@@ -139,7 +146,8 @@ class Observer:
                     command = clean(" ".join(info.command), 500)
                     self.recorder.write(ProcessSeen(self.recorder.now(), pid, clean(executable, 100), command))
         for pid in [pid for pid in self._processes if pid not in found]:
-            if self._processes.pop(pid):
+            if executable := self._processes.pop(pid):
+                self.ended_executables |= {executable}
                 by = EndedBy.GRADER if self._stopping else EndedBy.ITSELF
                 self.recorder.write(ProcessGone(self.recorder.now(), pid, by))
 
@@ -166,14 +174,14 @@ class Observer:
 
     # --- the graph --------------------------------------------------------------------------
 
-    def nodes(self) -> frozenset[str]:
-        """Fully qualified names of the other nodes."""
-        found = self.node.get_node_names_and_namespaces()
-        return frozenset(f"{space.rstrip('/')}/{name}" for name, space in found if name != self.name)
-
     def look_at_graph(self) -> None:
         """Record which endpoints came and went, and subscribe to what is published as it is offered."""
         now = self.recorder.now()
+        named = self.node.get_node_names_and_namespaces()
+        nodes = tuple(sorted(f"{space.rstrip('/')}/{name}" for name, space in named if name != self.name))
+        if nodes != self.nodes:
+            self.nodes = nodes
+            self.graph_changed_at = now
         found: dict[str, Endpoint] = {}
         for topic, _ in self.node.get_topic_names_and_types():
             if topic in HOUSEKEEPING_TOPICS[:2]:

@@ -26,7 +26,9 @@ class OutputLines:
     def take(self, data: bytes, at: float) -> list[Line]:
         """The lines that *data* completes."""
         *complete, rest = (self._rest + data).split(b"\n")
-        lines = [self._line(raw, at) for raw in complete[1:]] if self._overlong else [self._line(r, at) for r in complete]
+        lines = (
+            [self._line(raw, at) for raw in complete[1:]] if self._overlong else [self._line(r, at) for r in complete]
+        )
         if complete:
             self._overlong = False
         self._rest = rest

@@ -173,7 +173,11 @@ def _launching(scene: SceneView | None) -> tuple[Extract | None, ...]:
     said = [line.text for line in scene.lines if line.source == "launch"]
     printed = [f"[{line.source}] {line.text}" for line in scene.lines if line.source != "launch"]
     ended = [f"{name} ended by itself" for name in scene.started() if scene.ended_by_itself(name)]
-    return (_first("What the launch said", said), _first("What its nodes printed", printed), _first("Ended early", ended))
+    return (
+        _first("What the launch said", said),
+        _first("What its nodes printed", printed),
+        _first("Ended early", ended),
+    )
 
 
 def _conversing(view: View) -> tuple[Extract | None, ...]:
@@ -232,7 +236,9 @@ def _course(scene: SceneView) -> list[str]:
                 lines.append(f"{event.at:8.3f}  process {event.pid} ended {by}")
             case ProgramEnded():
                 how = f"code {event.code}" if event.code is not None else f"signal {event.signal}"
-                lines.append(f"{event.at:8.3f}  the program ended with {how} (ended by {event.by.value}) {event.limit}".rstrip())
+                lines.append(
+                    f"{event.at:8.3f}  the program ended with {how} (ended by {event.by.value}) {event.limit}".rstrip()
+                )
     lines += [f"measured {name} = {value:g}" for name, value in scene.measured.items()]
     lines += [_endpoint(endpoint) for endpoint in scene.endpoints if endpoint.event == "appeared"]
     lines += [f"unsupported by the grader's own launcher: {event.what}" for event in scene.unsupported]

@@ -27,23 +27,27 @@ def html(report: Report) -> str:
     """The whole page."""
     course = lab.course()
     rows = {row.id: row for row in lab.symptoms()}
-    return _environment().get_template("report.html.j2").render(
-        report=report,
-        result=report.result,
-        course=course,
-        mark=mark(report.result),
-        in_short=in_short(report.result),
-        left_out=left_out(report.result),
-        titles={check.id: check.title for check in report.result.checks},
-        symptom=rows.get,
-        section_link=functools.partial(section_link, course.worksheet_url),
-        symptom_link=functools.partial(symptom_link, course.worksheet_url),
-        sequence=_sequence(report.sequence),
-        sequence_said=sequence_said(report.sequence),
-        asked=_graph(report.asked, "asked", "The ROS graph as asked"),
-        seen=_graph(report.seen, "seen", "The ROS graph as it was seen") if report.seen else None,
-        graph_said=_graph_said(report.seen),
-        timeline=_timeline(report.timeline),
+    return (
+        _environment()
+        .get_template("report.html.j2")
+        .render(
+            report=report,
+            result=report.result,
+            course=course,
+            mark=mark(report.result),
+            in_short=in_short(report.result),
+            left_out=left_out(report.result),
+            titles={check.id: check.title for check in report.result.checks},
+            symptom=rows.get,
+            section_link=functools.partial(section_link, course.worksheet_url),
+            symptom_link=functools.partial(symptom_link, course.worksheet_url),
+            sequence=_sequence(report.sequence),
+            sequence_said=sequence_said(report.sequence),
+            asked=_graph(report.asked, "asked", "The ROS graph as asked"),
+            seen=_graph(report.seen, "seen", "The ROS graph as it was seen") if report.seen else None,
+            graph_said=_graph_said(report.seen),
+            timeline=_timeline(report.timeline),
+        )
     )
 
 

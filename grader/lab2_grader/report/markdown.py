@@ -58,7 +58,9 @@ def sparkline(values: Sequence[float | None], width: int = SPARKS) -> str:
     count = min(len(values), width)
     picked = [values[(index + 1) * len(values) // count - 1] for index in range(count)]
     top = len(BLOCKS) - 1
-    return "".join(" " if v is None else BLOCKS[round(top * (v - low) / (high - low)) if high > low else 0] for v in picked)
+    return "".join(
+        " " if v is None else BLOCKS[round(top * (v - low) / (high - low)) if high > low else 0] for v in picked
+    )
 
 
 def _markdown(report: Report, full: bool) -> str:

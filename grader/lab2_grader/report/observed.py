@@ -181,7 +181,10 @@ class _ObservedGraph:
         edges = [self._edge(endpoint) for endpoint in self._endpoints]
 
         numeric = lab.specification().numeric
-        for program, kind, role in ((numeric.talker, "publisher", talkers), (numeric.listener, "subscription", listeners)):
+        for program, kind, role in (
+            (numeric.talker, "publisher", talkers),
+            (numeric.listener, "subscription", listeners),
+        ):
             missing = [name for name, type_ in self._asked.items() if not self._has(kind, name, type_)]
             if not missing:
                 continue

@@ -384,6 +384,7 @@ def sequence_svg(
     width: int = 620,
     height: int = 220,
     what: str = "message",
+    key: bool = True,
 ) -> str:
     """Values in the order they came, against the expected ones, with the first departure ringed and named.
 
@@ -400,6 +401,7 @@ def sequence_svg(
         width: Natural width.
         height: Natural height.
         what: What one value is, for the axis and the words.
+        key: Whether the two lines are explained below.
     """
     at = first_departure(observed, expected) if departure is None else departure
     seen, asked = observed[:_MAX_POINTS], expected[:_MAX_POINTS]
@@ -440,8 +442,9 @@ def sequence_svg(
         parts.append(
             _text(x(at), 18, "! " + _departure_words(observed, expected, at, what), "small backed wrong", anchor)
         )
-    parts.append(_key(left, height - 5, "line", "observed"))
-    parts.append(_key(left + 100, height - 5, "expected", "expected"))
+    if key:
+        parts.append(_key(left, height - 5, "line", "observed"))
+        parts.append(_key(left + 100, height - 5, "expected", "expected"))
     if len(observed) > _MAX_POINTS:
         parts.append(_text(right, height - 5, f"the first {_MAX_POINTS:,} of {len(observed):,}", "small soft", "end"))
     words = desc or _describe_sequence(observed, expected, at, what)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rich import box
 from rich.console import Group, RenderableType
+from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
@@ -22,38 +22,42 @@ STYLES = {
 
 def terminal(result: Result) -> RenderableType:
     """What is shown at the end of a grade: the checks by checklist item, help for each lost point, the mark."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    table.add_column("Check", no_wrap=True)
-    table.add_column("Verdict", no_wrap=True)
-    table.add_column("Points", justify="right", no_wrap=True)
-    table.add_column("What it asks, and what was seen", overflow="fold")
+    parts: list[RenderableType] = []
     for item in result.checklist:
-        table.add_row(Text(item.text, style="bold"), "", _points(item.points, item.max_points), "", end_section=False)
+        heading = Text(f"{item.text}: {STATUS_WORDS[item.status]}", style="bold")
+        if item.max_points:
+            heading.append(f" ({item.points} of {item.max_points})")
+        parts += [Text(), heading]
         for check in result.checks:
             if check.item == item.item:
-                verdict = Text(f"{STATUS_MARKS[check.status]} {STATUS_WORDS[check.status]}", style=STYLES[check.status])
-                table.add_row(f"  {check.id}", verdict, _points(check.points, check.max_points), _said(check))
+                parts += [_headline(check), *_help(check)]
     notes = [Text(f"Note: {note}", style="dim") for note in result.notes]
     closing = Text.assemble(("Mark: ", "bold"), (mark(result), "bold green" if result.graded else "bold magenta"))
-    return Group(table, *notes, Text(), closing)
+    return Group(*parts, Text(), *notes, *([Text()] if notes else []), closing)
 
 
-def _points(points: int, of: int) -> Text:
-    return Text(f"{points}/{of}", style="" if points == of else "bold")
+def _headline(check: CheckResult) -> Table:
+    row = Table.grid(padding=(0, 1))
+    row.add_column(width=16, no_wrap=True)
+    row.add_column(width=5, justify="right", no_wrap=True)
+    row.add_column(width=20, no_wrap=True)
+    row.add_column(overflow="fold")
+    verdict = Text(f"  {STATUS_MARKS[check.status]} {STATUS_WORDS[check.status]}", style=STYLES[check.status])
+    said = check.observed if check.status in (Status.BLOCKED, Status.NOT_ASSESSED, Status.INCONCLUSIVE) else check.title
+    row.add_row(verdict, f"{check.points}/{check.max_points}", check.id, Text(said, style="dim"))
+    return row
 
 
-def _said(check: CheckResult) -> Text:
-    if check.status in (Status.PASS, Status.NOT_ASSESSED):
-        return Text(check.title if check.status is Status.PASS else check.observed, style="dim")
-    if check.status is Status.FAIL:
-        where = f" ({check.file}, line {check.line})" if check.line else ""
-        return Text.assemble(
-            ("expected  ", "dim"),
-            f"{check.expected}\n",
-            ("observed  ", "dim"),
-            f"{check.observed}\n",
-            ("try       ", "dim"),
-            f"{check.hint}{where} ",
-            (f"[{check.section}]", "dim"),
-        )
-    return Text(check.observed)
+def _help(check: CheckResult) -> list[RenderableType]:
+    """Expected, observed and what to try, for a check that did not pass."""
+    if check.status is not Status.FAIL:
+        return []
+    where = f" ({check.file}, line {check.line})" if check.line else ""
+    rows = Table.grid(padding=(0, 1))
+    rows.add_column(width=10, no_wrap=True, style="dim")
+    rows.add_column(overflow="fold")
+    rows.add_row("expected", Text(check.expected))
+    rows.add_row("observed", Text(check.observed))
+    rows.add_row("try", Text(f"{check.hint}{where}"))
+    rows.add_row("worksheet", Text(f"section {check.section}"))
+    return [Padding(rows, (0, 0, 1, 4))]

@@ -13,7 +13,15 @@ import msgspec
 from lab2_grader.checks.view import View
 from lab2_grader.records import CheckResult, Evidence, Result, Status
 from lab2_grader.report.extracts import Extract, extracts, staff_extracts
-from lab2_grader.report.observed import Conversation, Graph, Timeline, conversation, graph_asked, graph_observed, timeline
+from lab2_grader.report.observed import (
+    Conversation,
+    Graph,
+    Timeline,
+    conversation,
+    graph_asked,
+    graph_observed,
+    timeline,
+)
 
 HELD_BACK = (Status.FAIL, Status.PARTIAL, Status.INCONCLUSIVE)
 

@@ -20,7 +20,7 @@ TIME_LAPSE_LAUNCH = HERE / "time_lapse_launch.py"
 DISCOVERY_PROFILE = HERE / "quick_discovery.xml"
 
 
-class Ros(Record):
+class Ros(Record, frozen=True):
     """The ROS that is used.
 
     Args:
@@ -76,7 +76,7 @@ class Ros(Record):
         return tuple((name, value) for name, value in values.items() if value)
 
     def reads(self) -> tuple[str, ...]:
-        """Host paths that a process which uses this ROS must be able to read, besides the system and the interpreter."""
+        """Host paths that a process with this ROS must be able to read, besides the system and the interpreter."""
         outside = [p for p in self.prefixes if not Path(p).is_relative_to("/usr") and Path(p) != Path(sys.prefix)]
         return (*outside, str(LAUNCHER), str(TIME_LAPSE_LAUNCH), str(DISCOVERY_PROFILE))
 
@@ -91,7 +91,7 @@ class Ros(Record):
         """
         if not self.has_ros2_launch:
             follow = ("--use-sim-time",) if time_lapse else ()
-            return (sys.executable, "-P", str(LAUNCHER / "run.py"), *follow, package, launch_file)
+            return (sys.executable, str(LAUNCHER / "run.py"), *follow, package, launch_file)
         if time_lapse:
             return ("ros2", "launch", str(TIME_LAPSE_LAUNCH), f"launch_file:={path}")
         return ("ros2", "launch", package, launch_file)
@@ -129,7 +129,8 @@ def _sourced() -> Ros | None:
         return None
     if distro != lab.course().ros_distro:
         raise UsageError(
-            f"ROS 2 {distro} is sourced here; the lab uses {lab.course().ros_distro}. Source that one, or use --ros wheels."
+            f"ROS 2 {distro} is sourced here; the lab uses {lab.course().ros_distro}. "
+            "Source that one, or use --ros wheels."
         )
     # Only what belongs to ROS itself: an overlay workspace of the caller's must not reach a submission.
     underlays = tuple(p for p in prefixes if Path(p, "share", "rclpy").is_dir() or Path(p, "share", "ros2cli").is_dir())

@@ -17,6 +17,7 @@ from lab2_grader.records import GitFacts, Submission, SubmissionFacts
 from lab2_grader.submission import address as addresses
 from lab2_grader.submission import package, repository
 from lab2_grader.submission.archive import SUFFIXES, unpack
+from lab2_grader.submission.clone import take_commit
 from lab2_grader.text import clean
 
 __all__ = ["take"]
@@ -119,7 +120,7 @@ def _from_inner(archive: Path, name: str, source: str, into: Path, scratch: Path
 
 def _from_address(source: str, into: Path, scratch: Path, commit: str | None, before: datetime | None) -> Submission:
     address = addresses.checked(source)
-    clone = repository.take(address, scratch / "git", commit, before)
+    clone = take_commit(address, scratch / "git", commit, before)
     found = package.survey(clone.folder)
     if not found.names and clone.tree.submodules:
         raise refusal("package-is-submodule", path=clone.tree.submodules[0])

@@ -22,7 +22,8 @@ _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 class Readable(Protocol):
     """Whatever can be read piece by piece."""
 
-    def read(self, size: int, /) -> bytes | None: ...
+    def read(self, size: int, /) -> bytes | None:
+        """At most *size* bytes; none at the end."""
 
 
 class Bounds:

@@ -221,7 +221,7 @@ def _no_package(found: Survey, wanted: str) -> RefusedError:
     if found.setups:
         return refusal("no-package-xml", package=wanted, path=_below(found.setups[0], "setup.py"))
     if found.archives:
-        return refusal("archives-inside", package=wanted, archives=_listed(found.archives))
+        return refusal("archives-inside", package=wanted, archives=_listed(sorted(found.archives)))
     if found.unreadable:
         return refusal("unreadable", path=found.unreadable[0])
     if not found.files:

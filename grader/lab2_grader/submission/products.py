@@ -61,7 +61,7 @@ def is_left_out(name: str) -> bool:
 def is_left_out_for(name: str, children: Collection[str]) -> bool:
     """A folder called *name* that holds *children* is a virtual environment, colcon's, or a result of this grader."""
     held = frozenset(children)
-    if _ENVIRONMENT_MARK in held or _RESULT_MARKS <= held:
+    if _ENVIRONMENT_MARK in held or held >= _RESULT_MARKS:
         return True
     return name in COLCON and not held.isdisjoint(_COLCON_MARKS)
 

@@ -14,5 +14,7 @@ if __name__ == "__main__":
     sys.path.insert(0, HERE)
     from lab2_launcher.main import main  # type: ignore[import-not-found, unused-ignore]
 
-    sys.path.remove(HERE)  # what a launch file imports must not be found in here by chance
+    sys.path[:] = [
+        path for path in sys.path if path != HERE
+    ]  # what a launch file imports must not be found in here by chance
     sys.exit(main(sys.argv[1:]))

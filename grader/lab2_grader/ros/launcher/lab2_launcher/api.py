@@ -174,7 +174,10 @@ class _Finder:
 
     @staticmethod
     def find_spec(name: str, path: Sequence[str] | None = None, target: object = None) -> ModuleSpec | None:
-        if name.partition(".")[0] not in _ROOTS:
+        root = name.partition(".")[0]
+        if root in _ABSENT and root.startswith("launch_"):  # made for the real `launch`, even if it is there
+            return _LastFinder.find_spec(name)
+        if root not in _ROOTS:
             return None
         module_names(name)
         return ModuleSpec(name, _Loader(), origin=__file__, is_package=True) if name in _modules else None  # type: ignore[arg-type]

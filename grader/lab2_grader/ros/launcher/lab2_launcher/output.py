@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 STDOUT, STDERR = 1, 2
 LINE_BYTES = 16_384  # of one line of a process; the rest of a longer one is thrown away
+_REFUSAL = api.MARK.encode()
 _CUT = b" [line cut by the launcher]"
 
 
@@ -96,6 +97,8 @@ class Lines:
         self._skipping = False
 
     def _printed(self, line: bytes) -> bytes:
+        if self._fd == STDERR and line.startswith(_REFUSAL):  # of bin/ros2, or of a launcher that it has started
+            api.refuse(line[len(_REFUSAL) : LINE_BYTES].decode(errors="replace"))
         if len(line) > LINE_BYTES:
             line = line[:LINE_BYTES] + _CUT
         if self._decorate is not None:

@@ -46,7 +46,7 @@ def load_python_launch_file_as_module(python_launch_file_path: str) -> ModuleTyp
     module.__file__ = python_launch_file_path
     with open(python_launch_file_path, "rb") as file:
         code = compile(file.read(), python_launch_file_path, "exec", dont_inherit=True)
-    exec(code, module.__dict__)  # noqa: S102 - this is what the launcher is for
+    exec(code, module.__dict__)
     return module
 
 

@@ -1,0 +1,109 @@
+"""The contract of the command line: exit codes, sentences, and what is on disk afterwards."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+
+KEYS = {"schema", "submission", "graded", "score", "max_score", "checklist", "checks", "notes", "runtime", "seconds"}
+CHECK_KEYS = {"id", "item", "title", "status", "points", "max_points", "expected", "observed", "hint", "section"}
+
+
+def run(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Run the real command in *cwd*."""
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT / 'grader'}:{os.environ.get('PYTHONPATH', '')}"}
+    command = [sys.executable, "-m", "lab2_grader", *arguments]
+    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_a_grade_says_the_mark_and_leaves_a_whole_result(tmp_path: Path) -> None:
+    done = run("grade", str(ROOT / "solution"), "--out", str(tmp_path / "out"), cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert "Mark: 92 of 92" in done.stdout
+    result = json.loads((tmp_path / "out/result.json").read_text())
+    assert result.keys() >= KEYS
+    assert all(check.keys() >= CHECK_KEYS for check in result["checks"])
+    assert result["schema"] == "lab2-grader/result/1"
+    assert (result["graded"], result["score"], result["max_score"]) == (True, 92, 92)
+    assert {path.name for path in (tmp_path / "out").iterdir()} >= {"result.json", "report.md", "evidence"}
+
+
+@pytest.mark.parametrize(("mark", "code"), [(92, 0), (93, 1)])
+def test_fail_under_turns_a_low_mark_into_an_exit_code(tmp_path: Path, mark: int, code: int) -> None:
+    done = run("grade", str(ROOT / "solution"), "--out", str(tmp_path / "out"), "--fail-under", str(mark), cwd=tmp_path)
+
+    assert done.returncode == code, done.stderr
+
+
+def test_the_template_gets_its_floor(tmp_path: Path) -> None:
+    done = run("grade", str(ROOT / "lab2_template"), "--out", str(tmp_path / "out"), cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "out/result.json").read_text())
+    statuses = {check["id"]: check["status"] for check in result["checks"]}
+    assert {name for name, status in statuses.items() if status == "pass"} == {"package-builds", "originals-kept"}
+    assert result["score"] == 9
+
+
+def _corrupt(path: Path) -> None:
+    path.write_bytes(b"PK\x03\x04" + b"\0" * 200)
+
+
+def _climbing(path: Path) -> None:
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("../package.xml", "<package><name>lab2</name></package>")
+
+
+@pytest.mark.parametrize(
+    ("name", "make", "said"),
+    [
+        ("nowhere", None, "cannot be graded: No such file or directory"),
+        ("empty", lambda path: path.mkdir(), "There is nothing in it"),
+        ("other", lambda path: (path.mkdir(), (path / "notes.txt").write_text("hello")), "No package named lab2"),
+        ("text.zip", lambda path: path.write_text("hello"), "archive"),
+        ("corrupt.zip", _corrupt, ""),
+        ("climbing.zip", _climbing, ".."),
+    ],
+)
+def test_what_cannot_be_graded_is_refused_in_a_sentence(tmp_path: Path, name: str, make: object, said: str) -> None:
+    if callable(make):
+        make(tmp_path / name)
+    done = run("grade", str(tmp_path / name), "--out", str(tmp_path / "out"), cwd=tmp_path)
+
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert len(done.stderr.strip()) > 20
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unknown_option_is_wrong_usage(tmp_path: Path) -> None:
+    assert run("grade", ".", "--no-such-option", cwd=tmp_path).returncode == 2
+
+
+def test_rescoring_gives_the_same_bytes(tmp_path: Path) -> None:
+    run("grade", str(ROOT / "solution"), "--out", str(tmp_path / "out"), cwd=tmp_path)
+    before = (tmp_path / "out/result.json").read_bytes()
+
+    done = run("rescore", str(tmp_path / "out"), cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out/result.json").read_bytes() == before
+
+
+def test_explain_tells_every_check(tmp_path: Path) -> None:
+    done = run("explain", cwd=tmp_path)
+    assert done.returncode == 0
+    for line in done.stdout.splitlines():
+        told = run("explain", line.split()[0], cwd=tmp_path)
+        assert told.returncode == 0, told.stderr
+        assert "Ruling:" in told.stdout
+    assert run("explain", "no-such-check", cwd=tmp_path).returncode == 2
