@@ -100,7 +100,12 @@ def sequence_said(sequence: Conversation | None) -> str:
 def _graph_said(graph: Graph | None) -> str:
     if graph is None:
         return messages.report("graph-none")
-    right = all(part.mark is Mark.OK for part in (*graph.nodes, *graph.topics, *graph.edges))
+    marks = (
+        {node.mark for node in graph.nodes}
+        | {topic.mark for topic in graph.topics}
+        | {edge.mark for edge in graph.edges}
+    )
+    right = marks <= {Mark.OK}
     return messages.report("graph-right" if right else "graph-differs")
 
 
