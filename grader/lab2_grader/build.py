@@ -7,6 +7,7 @@ hostile as everything else.
 
 from __future__ import annotations
 
+import ast
 import configparser
 import io
 import sys
@@ -123,9 +124,48 @@ def _dangling(prefix: Path, package: str) -> tuple[str, ...]:
     for point in _entry_points(prefix):
         module = point.target.split(":")[0].strip()
         path = _site_packages(prefix).joinpath(*module.split("."))
-        if module.split(".")[0] == package and not (path.is_dir() or path.with_suffix(".py").is_file()):
+        own = module.split(".")[0] == package or point.name in _programs()
+        if own and not (path.is_dir() or path.with_name(f"{path.name}.py").is_file()):
             found.append(point.name)
     return tuple(sorted(found))
+
+
+def _programs() -> frozenset[str]:
+    pairs = lab.specification()
+    return frozenset((pairs.original.talker, pairs.original.listener, pairs.numeric.talker, pairs.numeric.listener))
+
+
+def without_function(build: Build, installed: Path) -> frozenset[str]:
+    """Executables whose entry point names a function that its module does not define, as far as its syntax tree tells.
+
+    Args:
+        build: What was built.
+        installed: Where it was unpacked.
+    """
+    prefix = installed / "install" / lab.specification().package
+    found = set()
+    for point in build.entry_points:
+        module, _, function = (part.strip() for part in point.target.partition(":"))
+        path = _site_packages(prefix).joinpath(*module.split(".")).with_suffix(".py")
+        if path.is_file() and not _defines(path, function.split(".")[0]):
+            found.add(point.name)
+    return frozenset(found)
+
+
+def _defines(path: Path, name: str) -> bool:
+    """Whether the module at *path* gives *name* a meaning at its top; true when that cannot be told."""
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return True
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef) and node.name == name:
+            return True
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id == name:
+            return True
+        if isinstance(node, ast.alias) and (node.asname or node.name) in (name, "*"):
+            return True
+    return False
 
 
 def _launch_files(share: Path) -> tuple[str, ...]:

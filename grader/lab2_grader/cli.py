@@ -8,19 +8,25 @@ import sys
 import time
 import traceback
 from collections.abc import Sequence
+from contextlib import nullcontext
+from datetime import datetime
 from pathlib import Path
 from types import FrameType
 
+from rich import box
 from rich.console import Console
 from rich.live import Live
 from rich.spinner import Spinner
+from rich.table import Table
 from rich.text import Text
 
 from lab2_grader import __version__, bag, doctor, evidence, lab, pipeline, process, report, ros, sandbox
 from lab2_grader.checks import verdicts
+from lab2_grader.classroom import gradebook, remark, run
+from lab2_grader.classroom.progress import Progress
 from lab2_grader.errors import Lab2Error, RefusedError, UsageError
 from lab2_grader.outlets import GithubJob, Gradescope, Outlet
-from lab2_grader.records import Clock, Evidence, Result
+from lab2_grader.records import ClassState, Clock, Evidence, Result
 from lab2_grader.report import Audience, github
 from lab2_grader.report.terminal import plain, terminal
 
@@ -78,6 +84,42 @@ def _parser() -> argparse.ArgumentParser:
     grade.add_argument("--ci", action="store_true", help="in a GitHub workflow: job summary, annotations, outputs")
     grade.add_argument("--gradescope", type=Path, metavar="DIR", help="Gradescope's folder, /autograder there")
     grade.set_defaults(run=_grade)
+
+    grade_all = commands.add_parser("grade-all", help="grade a class; go on where an earlier call stopped")
+    grade_all.add_argument(
+        "inbox",
+        help="a folder of submissions, a download from Minerva or Moodle, or a CSV of students and repositories",
+    )
+    grade_all.add_argument("--out", type=Path, default=Path("results"), help="where the results go (default: results)")
+    grade_all.add_argument(
+        "--jobs", type=_positive, default=0, help="submissions at once (default: what this machine carries)"
+    )
+    grade_all.add_argument("--rubric", type=Path, help="a rubric of your own")
+    grade_all.add_argument(
+        "--before", type=_deadline, metavar="TIME", help="of repositories, take the last commit before"
+    )
+    grade_all.add_argument(
+        "--scheduler", default="", metavar="ADDRESS", help="send the work to a Dask cluster (tcp://…)"
+    )
+    grade_all.add_argument("--ros", choices=("auto", "sourced", "wheels"), default="auto", help="which ROS to use")
+    grade_all.add_argument(
+        "--clock", type=Clock, choices=list(Clock), default=Clock.TIME_LAPSE, help="how time is driven"
+    )
+    grade_all.add_argument(
+        "--isolation", choices=("auto", "off"), default="auto", help="off: run them with your own rights"
+    )
+    grade_all.set_defaults(run=_grade_all)
+
+    book = commands.add_parser("gradebook", help="take marks to a gradebook").add_subparsers(
+        required=True, metavar="COMMAND"
+    )
+    fill = book.add_parser("fill", help="fill a file downloaded from Minerva or Moodle with the marks of a class")
+    fill.add_argument("--results", type=Path, required=True, help="the folder that grade-all wrote")
+    fill.add_argument("--in", dest="download", type=Path, required=True, help="the file as it was downloaded")
+    fill.add_argument("--out", type=Path, required=True, help="the file to upload")
+    fill.add_argument("--column", default="", help="title or id of the column, where several could take a mark")
+    fill.add_argument("--feedback", action="store_true", help="fill the column for feedback too")
+    fill.set_defaults(run=_fill)
 
     rescore = commands.add_parser("rescore", help="judge recorded evidence again; needs no ROS")
     rescore.add_argument("results", type=Path, help="a result's folder, or a folder of such folders")
@@ -167,16 +209,52 @@ def _exit_code(result: Result, fail_under: int | None) -> int:
     return BELOW if fail_under is not None and result.score < fail_under else GRADED
 
 
-def _rescore(arguments: argparse.Namespace) -> int:
-    rubric = lab.rubric(arguments.rubric)
-    root: Path = arguments.results
-    folders = sorted(path.parent for path in (*root.glob("evidence"), *root.glob("*/evidence")))
-    if not folders:
-        raise UsageError(f"There is no evidence in {root}. Give a folder that `lab2-grader grade` wrote.")
-    for folder in folders:
-        result = pipeline.rescore(folder, rubric)
-        pipeline.write_reports(folder, result)
-        out.print(Text(f"{folder.name}: {result.score if result.graded else 'withheld'} of {result.max_score}"))
+def _grade_all(arguments: argparse.Namespace) -> int:
+    order = run.Order(
+        inbox=arguments.inbox,
+        out=str(arguments.out),
+        rubric=lab.rubric(arguments.rubric),
+        clock=arguments.clock,
+        ros=arguments.ros,
+        isolation=arguments.isolation != "off",
+        jobs=arguments.jobs,
+        before=arguments.before,
+        scheduler=arguments.scheduler,
+    )
+    if not order.isolation:
+        err.print(
+            Text(
+                sandbox.protections_off(sandbox.Isolation(on=False, reason="it was switched off")), style="bold yellow"
+            )
+        )
+    live = err.is_terminal
+    progress = Progress(None if live else lambda line: err.print(Text(line)))
+    with Live(progress, console=err, refresh_per_second=4) if live else nullcontext():
+        summary = run.grade_class(order, progress)
+    for item in summary.unknown:
+        out.print(Text(f"Not understood: {item.what}: {item.reason}"))
+    unmarked = [line for line in summary.lines if line.state is not ClassState.GRADED]
+    for line in unmarked:
+        out.print(Text(f"{line.state.value.capitalize()}: {line.name}: {line.reason}"))
+    out.print(Text(f"{len(summary.lines) - len(unmarked)} of {len(summary.lines)} submissions have a mark."))
+    out.print(Text(f"Overview: {arguments.out / 'index.html'}"))
+    return NOT_GRADED if any(line.state is ClassState.WITHHELD for line in summary.lines) else GRADED
+
+
+def _fill(arguments: argparse.Namespace) -> int:
+    filled = gradebook.fill(
+        arguments.results, arguments.download, arguments.out, column=arguments.column, feedback=arguments.feedback
+    )
+    out.print(
+        Text(f"{filled.cells} marks written to {arguments.out}, out of {filled.total} each, column “{filled.column}”.")
+    )
+    for heading, names in (
+        ("Without a mark, so left as they were", filled.without_mark),
+        ("In the gradebook, but nothing was handed in", filled.only_in_book),
+        ("Graded, but not in the gradebook", filled.only_in_results),
+    ):
+        if names:
+            out.print(Text(f"{heading}: {', '.join(names)}"))
     return GRADED
 
 
@@ -209,6 +287,35 @@ def _doctor(_arguments: argparse.Namespace) -> int:
     ill = sum(not finding.well for finding in findings)
     out.print(Text(f"{ill} of {len(findings)} things need mending." if ill else "Nothing needs mending."))
     return BELOW if ill else GRADED
+
+
+def _rescore(arguments: argparse.Namespace) -> int:
+    done = remark.rescore(arguments.results, lab.rubric(arguments.rubric))
+    if done.changes:
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+        for heading in ("Submission", "Was", "Is", "Why"):
+            table.add_column(heading, justify="right" if heading in ("Was", "Is") else "left", overflow="fold")
+        for change in done.changes:
+            table.add_row(Text(change.name), Text(change.was), Text(change.now), Text("; ".join(change.why)))
+        out.print(table)
+    for name, reason in done.failed:
+        err.print(Text(f"{name}: {reason}"))
+    out.print(Text(f"{done.count} judged again; {len(done.changes)} changed."))
+    return USAGE if done.failed else GRADED
+
+
+def _positive(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError("give a whole number from 1")
+    return int(text)
+
+
+def _deadline(text: str) -> datetime:
+    try:
+        found = datetime.fromisoformat(text.removesuffix("Z") + "+00:00" * text.endswith("Z"))
+    except ValueError:
+        raise argparse.ArgumentTypeError("give a time like 2026-10-23T17:00 or 2026-10-23T17:00+01:00") from None
+    return found if found.tzinfo else found.astimezone()
 
 
 def _explain(arguments: argparse.Namespace) -> int:

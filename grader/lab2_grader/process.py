@@ -94,23 +94,21 @@ def control_groups_if_known() -> cgroup.Base | None:
 
 
 class ProcessInfo:
-    """A line of the process table: `pid`, `command` (its arguments), and whether it wants the processor (`busy`)."""
+    """A line of the process table: `pid` and `command` (its arguments)."""
 
-    __slots__ = ("busy", "command", "pid")
+    __slots__ = ("command", "pid")
 
-    def __init__(self, pid: int, command: tuple[str, ...], busy: bool) -> None:
+    def __init__(self, pid: int, command: tuple[str, ...]) -> None:
         self.pid = pid
         self.command = command
-        self.busy = busy
 
 
 class _Stat:
     """What the kernel counts of one process; `cpu_seconds` with that of its children that have ended."""
 
-    __slots__ = ("busy", "cpu_seconds", "parent", "resident", "threads")
+    __slots__ = ("cpu_seconds", "parent", "resident", "threads")
 
     def __init__(self, fields: list[bytes]) -> None:
-        self.busy = fields[0] in (b"R", b"D")
         self.parent = int(fields[1])
         self.cpu_seconds = sum(map(int, fields[11:15])) / CLOCK_TICKS
         self.threads = int(fields[17])
@@ -151,14 +149,25 @@ def _descendants(root: int) -> dict[int, _Stat]:
 def tree(root: int) -> tuple[ProcessInfo, ...]:
     """The living processes below and including *root*, by pid, each with its arguments."""
     found = []
-    for pid, stat in sorted(_descendants(root).items()):
+    for pid in sorted(_descendants(root)):
         try:
             raw = Path(f"/proc/{pid}/cmdline").read_bytes()
         except OSError:
             continue
         command = tuple(part.decode(errors="replace") for part in raw.rstrip(b"\0").split(b"\0"))
-        found.append(ProcessInfo(pid, command, stat.busy))
+        found.append(ProcessInfo(pid, command))
     return tuple(found)
+
+
+def busy(root: int) -> bool:
+    """Whether a thread of *root* or of its descendants runs, or waits for a processor or a disk."""
+    for pid in _descendants(root):
+        with contextlib.suppress(OSError):
+            for thread in Path(f"/proc/{pid}/task").iterdir():
+                text = (thread / "stat").read_bytes()
+                if text[text.rindex(b")") + 2 :][:1] in (b"R", b"D"):
+                    return True
+    return False
 
 
 class Process:

@@ -14,6 +14,7 @@ import msgspec
 
 EVIDENCE_SCHEMA = "lab2-grader/evidence/1"
 RESULT_SCHEMA = "lab2-grader/result/1"
+CLASS_SCHEMA = "lab2-grader/class/1"
 
 
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -224,7 +225,7 @@ class Clock(str, Enum):
 
 
 class Phase(Row, frozen=True):
-    """A part of the scene begins: `start`, `graph`, `period`, `slow`, `fast`, `real-time`, `send`, `stop`."""
+    """A part of the scene begins: `start`, `graph`, `period`, `slow`, `fast`, `real-time`, `send <topic>`, `stop`."""
 
     at: float
     name: str
@@ -368,6 +369,8 @@ class ScenePlan(Record, frozen=True):
         clock: Who drives the ROS clock.
         program: What to start in the submission's sandbox.
         label: The executable's name when the program is one executable; empty when it is a launch.
+        talker: The executable that is the talker of a launch.
+        listener: The executable that is the listener of a launch.
         numbers: Numbers to publish (listener).
         texts: Strings to publish (listener).
     """
@@ -376,6 +379,8 @@ class ScenePlan(Record, frozen=True):
     clock: Clock
     program: Request
     label: str
+    talker: str = ""
+    listener: str = ""
     numbers: tuple[int, ...] = ()
     texts: tuple[str, ...] = ()
 
@@ -586,3 +591,127 @@ class Result(Record, frozen=True):
     seconds: Seconds
     digests: Digests
     signature: str = ""
+
+
+# --- a class ------------------------------------------------------------------------------------
+
+
+class Unknown(Record, frozen=True):
+    """Something in the inbox that is not graded, and why."""
+
+    what: str
+    reason: str
+
+
+class ClassState(str, Enum):
+    """What became of a submission."""
+
+    GRADED = "graded"
+    WITHHELD = "withheld"  # inconclusive, or the grader failed
+    REFUSED = "refused"
+    WAITING = "waiting"  # not graded yet: the class was interrupted
+
+
+class Lost(Record, frozen=True):
+    """A check that a submission lost points on.
+
+    Args:
+        check: Its id.
+        status: Its status.
+        points: Points lost.
+        message: Key of the fault, empty when there is none.
+        observed: What was seen.
+    """
+
+    check: str
+    status: str
+    points: int
+    message: str
+    observed: str
+
+
+class ClassLine(Record, frozen=True):
+    """One submission in the summary.
+
+    Args:
+        name: Names the folder of its results.
+        student: For people.
+        keys: By what a gradebook knows the student.
+        state: What became of it.
+        score: Points; None without a mark.
+        max_score: Points that could be had; 0 when nothing was judged.
+        reason: Why there is no mark; empty when there is one.
+        lost: Checks that did not pass, in the rubric's order.
+        flags: What a person should look at.
+        note: What a person should know of how it was handed in.
+        shown: Where it came from.
+        commit: Full commit id, or None.
+        sha256: Digest of the package; empty when it was refused.
+        seconds: What grading it took.
+        attempts: How often it was graded.
+        report: Its report, relative to the summary; empty for none.
+    """
+
+    name: str
+    student: str
+    keys: tuple[str, ...]
+    state: ClassState
+    score: int | None = None
+    max_score: int = 0
+    reason: str = ""
+    lost: tuple[Lost, ...] = ()
+    flags: tuple[str, ...] = ()
+    note: str = ""
+    shown: str = ""
+    commit: str | None = None
+    sha256: str = ""
+    seconds: float = 0.0
+    attempts: int = 0
+    report: str = ""
+
+
+class CommonFault(Record, frozen=True):
+    """A way in which a check was missed, how many did, and one of the observations."""
+
+    message: str
+    count: int
+    example: str
+
+
+class CheckRate(Record, frozen=True):
+    """How a class did in one check; `judged` leaves out what was not assessed or inconclusive."""
+
+    id: str
+    title: str
+    section: str
+    passed: int
+    judged: int
+    faults: tuple[CommonFault, ...]
+
+
+class ClassSummary(Record, frozen=True):
+    """`summary.json`.
+
+    Args:
+        schema: Always `CLASS_SCHEMA`.
+        title: Of the lab.
+        grader: Version of the grader.
+        code: Digest of the grader's code and facts.
+        rubric: SHA-256 of the rubric.
+        max_score: What the rubric's checks are worth together.
+        lines: One for each submission, by name.
+        checks: One for each check, in the rubric's order.
+        identical: Names of submissions with the same package, group by group.
+        unknown: What in the inbox was not understood.
+    """
+
+    schema: str
+    title: str
+    grader: str
+    code: str
+    rubric: str
+    max_score: int
+    lines: tuple[ClassLine, ...]
+    checks: tuple[CheckRate, ...]
+    identical: tuple[tuple[str, ...], ...]
+    unknown: tuple[Unknown, ...]

@@ -7,17 +7,18 @@ for their plan. What they say goes to the evidence file as it comes.
 from __future__ import annotations
 
 import random
+import re
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 import msgspec
 
 from lab2_grader import lab, process, sandbox
+from lab2_grader.build import without_function
 from lab2_grader.evidence import SceneEntry, Writer, events
-from lab2_grader.near import nearest
 from lab2_grader.records import (
     Build,
     Clock,
@@ -33,7 +34,9 @@ from lab2_grader.records import (
 )
 from lab2_grader.ros import Ros
 from lab2_grader.ros.domains import Domain
+from lab2_grader.stand_in import launched, program
 
+REMAPPING = re.compile(r" (?:-r|--remap) (\S+:=\S+)")
 INSTALLED = f"{sandbox.WORKSPACE}/install"
 OBSERVER_OUTPUT_BYTES = 40_000_000
 OBSERVER_GRACE_SECONDS = 30.0
@@ -174,23 +177,21 @@ class Stage:
         """
         specification = lab.specification()
         numeric, original = specification.numeric, specification.original
-        jobs: list[Callable[[], tuple[Scene, ...]]] = []
+        jobs: list[Callable[[], tuple[Scene, ...]]] = [lambda: self._conversation_and_talker(build, installed)]
         if self._single(numeric.listener, build, installed) is not None:
-            observer = self._waiting.pop()
-            jobs.append(lambda: (self._listener(observer, build, installed),))
+            jobs.append(lambda: (self._listener(build, installed),))
         if _launch_path(build, original.launch_file):
-            second = self._waiting.pop()
-            jobs.append(lambda: (self._launched(SceneName.ORIGINALS, second, build, installed, original.launch_file),))
-        jobs.insert(0, lambda: self._conversation_and_talker(build, installed))
+            jobs.append(lambda: (self._launched(SceneName.ORIGINALS, build, installed, original),))
         with ThreadPoolExecutor(max_workers=len(jobs)) as pool:
             futures: list[Future[tuple[Scene, ...]]] = [pool.submit(job) for job in jobs]
             try:
-                scenes = [scene for future in futures for scene in future.result()]
+                scenes = {scene.name: scene for future in futures for scene in future.result()}
             except BaseException:
                 self._dismiss_all()
                 raise
-        order = list(SceneName)
-        return tuple(sorted(scenes, key=lambda scene: order.index(scene.name)))
+        if remappings := _remappings_that_help(scenes, launched(numeric.listener, build)):
+            scenes[SceneName.LISTENER] = self._listener(build, installed, remappings)
+        return tuple(scenes[name] for name in SceneName if name in scenes)
 
     # --- one scene each ---------------------------------------------------------------------
 
@@ -198,35 +199,42 @@ class Stage:
         scenes: tuple[Scene, ...] = ()
         numeric = lab.specification().numeric
         if _launch_path(build, numeric.launch_file):
-            observer = self._waiting.pop(0) if self._waiting else self._observer()
-            scenes = (self._launched(SceneName.CONVERSATION, observer, build, installed, numeric.launch_file),)
-            if _shows_talker(scenes[0]):
+            scenes = (self._launched(SceneName.CONVERSATION, build, installed, numeric),)
+            if _shows_talker(scenes[0], launched(numeric.talker, build)):
                 return scenes
-        single = self._single(numeric.talker, build, installed, follow=self._clock is Clock.TIME_LAPSE)
+        follow = ("-p", "use_sim_time:=true") if self._clock is Clock.TIME_LAPSE else ()
+        single = self._single(numeric.talker, build, installed, follow)
         if single is None:
             return scenes
         how, label, request = single
-        plan = ScenePlan(SceneName.TALKER, self._clock, request, label)
-        observer = self._waiting.pop(0) if self._waiting else self._observer()
-        return (*scenes, observer.play(plan, how, self._writer.scene_path(plan.scene)))
+        return (*scenes, self._play(ScenePlan(SceneName.TALKER, self._clock, request, label), how))
 
-    def _launched(self, name: SceneName, observer: _Observer, build: Build, installed: Path, launch_file: str) -> Scene:
+    def _launched(self, name: SceneName, build: Build, installed: Path, pair: lab.Pair) -> Scene:
         clock = self._clock if name is SceneName.CONVERSATION else Clock.REAL_TIME
         package = lab.specification().package
-        path = f"{self._prefix(installed)}/share/{package}/{_launch_path(build, launch_file)}"
-        argv = self._ros.launch_argv(package, launch_file, path, clock is Clock.TIME_LAPSE)
-        plan = ScenePlan(name, clock, self._confined(argv, installed), "")
-        return observer.play(plan, "launch", self._writer.scene_path(name))
+        path = f"{self._prefix(installed)}/share/{package}/{_launch_path(build, pair.launch_file)}"
+        argv = self._ros.launch_argv(package, pair.launch_file, path, clock is Clock.TIME_LAPSE)
+        request = self._confined(argv, installed)
+        is_original = name is SceneName.ORIGINALS
+        talker, listener = (n if is_original else launched(n, build) for n in (pair.talker, pair.listener))
+        return self._play(ScenePlan(name, clock, request, "", talker, listener), "launch")
 
-    def _listener(self, observer: _Observer, build: Build, installed: Path) -> Scene:
+    def _listener(self, build: Build, installed: Path, remappings: tuple[str, ...] = ()) -> Scene:
         listener, limits = lab.specification().numeric.listener, lab.limits().listener
-        single = self._single(listener, build, installed)
+        single = self._single(listener, build, installed, remappings)
         assert single is not None
         how, label, request = single
-        numbers = self._random.sample(range(-128, 128), limits.numbers + 1)
-        texts = [" ".join(self._random.sample(WORDS, 3)) for _ in range(limits.texts + 1)]
-        plan = ScenePlan(SceneName.LISTENER, Clock.REAL_TIME, request, label, tuple(numbers), tuple(texts))
-        return observer.play(plan, how, self._writer.scene_path(plan.scene))
+        numbers = tuple(self._random.sample(range(-128, 128), limits.numbers + 1))
+        texts = tuple(" ".join(self._random.sample(WORDS, 3)) for _ in range(limits.texts + 1))
+        plan = ScenePlan(SceneName.LISTENER, Clock.REAL_TIME, request, label, numbers=numbers, texts=texts)
+        return self._play(plan, how)
+
+    def _play(self, plan: ScenePlan, started_with: str) -> Scene:
+        try:
+            observer = self._waiting.pop()
+        except IndexError:
+            observer = self._observer()
+        return observer.play(plan, started_with, self._writer.scene_path(plan.scene))
 
     # --- what is started --------------------------------------------------------------------
 
@@ -235,28 +243,22 @@ class Stage:
         return f"{root}/{lab.specification().package}"
 
     def _single(
-        self, name: str, build: Build, installed: Path, follow: bool = False
+        self, name: str, build: Build, installed: Path, arguments: tuple[str, ...] = ()
     ) -> tuple[str, str, Request] | None:
         """How to start *name* by itself: (`executable` or `module`, its name, the request); None when there is nothing.
 
-        Failing the executable the module of that name, failing that the one whose name comes nearest: a missing entry
-        point or a misspelt file costs its own marks and no others.
+        Args:
+            name: Of the worksheet's program.
+            build: What was built.
+            installed: Where it was unpacked.
+            arguments: What follows `--ros-args`.
         """
-        package, specification = lab.specification().package, lab.specification()
-        ros_arguments = ("--ros-args", "-p", "use_sim_time:=true") if follow else ()
-        pairs = (specification.original, specification.numeric)
-        taken = {program for pair in pairs for program in (pair.talker, pair.listener)}
-        executables = [found for found in build.executables if found not in build.dangling]
-        candidates = (
-            ("executable", name if name in executables else ""),
-            ("module", name if name in build.modules else ""),
-            ("executable", nearest(name, executables, taken)),
-            ("module", nearest(name, build.modules, taken)),
-        )
-        how, found = next((candidate for candidate in candidates if candidate[1]), ("", ""))
+        package = lab.specification().package
+        ros_arguments = ("--ros-args", *arguments) if arguments else ()
+        how, found = program(name, build, without_function(build, installed))
         if how == "executable":
-            program = f"{self._prefix(installed)}/lib/{package}/{found}"
-            return how, found, self._confined((program, *ros_arguments), installed)
+            path = f"{self._prefix(installed)}/lib/{package}/{found}"
+            return how, found, self._confined((path, *ros_arguments), installed)
         if how == "module":
             argv = (sys.executable, "-c", RUN_MODULE, f"{package}.{found}", *ros_arguments)
             return how, found, self._confined(argv, installed)
@@ -295,11 +297,10 @@ def _launch_path(build: Build, name: str) -> str:
     return next((path for path in build.launch_files if path.rsplit("/", 1)[-1] == name), "")
 
 
-def _shows_talker(scene: Scene) -> bool:
-    """Whether the launch let the talker be judged: it ran, spoke, and nobody else spoke on either topic."""
+def _shows_talker(scene: Scene, talker: str) -> bool:
+    """Whether the launch let the *talker* be judged: it ran, spoke, and nobody else spoke on either topic."""
     specification = lab.specification()
     topics = (specification.number_topic.name, specification.text_topic.name)
-    talker = specification.numeric.talker
     started = any(isinstance(event, ProcessSeen) and event.executable == talker for event in scene.events)
     speakers = [
         (event.node, event.topic)
@@ -311,3 +312,26 @@ def _shows_talker(scene: Scene) -> bool:
     ]
     heard = any(isinstance(event, Message) and event.topic == topics[0] for event in scene.events)
     return started and heard and len({node for node, _ in speakers}) == 1 and len(speakers) <= len(topics)
+
+
+def _remappings_that_help(scenes: Mapping[SceneName, Scene], listener: str) -> tuple[str, ...]:
+    """The remappings (`-r from:=to …`) with which the launch brings the *listener* to the topics; empty for none needed.
+
+    A listener that speaks of another topic, which its launch file remaps to the right one, is right (VERDICTS). By itself
+    it would miss what is sent, so it is listened to again as the launch starts it.
+    """
+    alone, together = scenes.get(SceneName.LISTENER), scenes.get(SceneName.CONVERSATION)
+    if alone is None or together is None:
+        return ()
+    topics = {lab.specification().number_topic.name, lab.specification().text_topic.name}
+    if not (topics & _subscribed(together)) - _subscribed(alone):
+        return ()
+    commands = (e.command for e in together.events if isinstance(e, ProcessSeen) and e.executable == listener)
+    found = REMAPPING.findall(next(commands, ""))
+    return tuple(word for remapping in found for word in ("-r", remapping))
+
+
+def _subscribed(scene: Scene) -> frozenset[str]:
+    return frozenset(
+        event.topic for event in scene.events if isinstance(event, Endpoint) and event.kind == "subscription"
+    )

@@ -10,6 +10,7 @@ from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
 from lab2_grader.reading import numbers_in
 from lab2_grader.records import Message, SceneName, Status, Verdict
+from lab2_grader.stand_in import launched
 
 Earlier = Mapping[str, Verdict]
 
@@ -27,13 +28,14 @@ def launch_starts(view: View, earlier: Earlier) -> Verdict:
     if fault := _our_fault(check, scene):
         return fault
     numeric = view.specification.numeric
+    build = view.build
+    assert build is not None
     started = scene.started()
-    missing = [name for name in (numeric.talker, numeric.listener) if name not in started]
+    pair = {name: launched(name, build) for name in (numeric.talker, numeric.listener)}
+    missing = [name for name, executable in pair.items() if executable not in started]
     if not missing:
         return passed(check)
     error = launch_error(scene)
-    build = view.build
-    assert build is not None
     if asked := NO_EXECUTABLE.search(error):
         if asked[1] in (numeric.talker, numeric.listener):
             return blocked(check, "entry-points")
@@ -71,13 +73,16 @@ def launch_only_numeric(view: View, earlier: Earlier) -> Verdict:
         return blocked(check, "launch-starts")
     if fault := _our_fault(check, scene):
         return fault
-    numeric = (view.specification.numeric.talker, view.specification.numeric.listener)
+    build = view.build
+    assert build is not None
+    pair = view.specification.numeric
+    numeric = (launched(pair.talker, build), launched(pair.listener, build))
     started = scene.started()
     others = [name for name in started if name not in numeric]
     if others:
         return failed(check, "others", others=names(others))
     if not started or launch_error(scene):
-        return blocked(check, "launch-starts")
+        return blocked(check, *(earlier["launch-starts"].because or ("launch-starts",)))
     # Two of one in the place of the other is one fault, and launch-starts has it.
     twice = [name for name in numeric if started.get(name, 0) > 1 and not _respawned(scene, name)]
     if twice and all(name in started for name in numeric):
@@ -101,10 +106,12 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
     received_but_not_printed = ("silent", "some", "noise", "died-on-number")
     if _is_conversation(spoken, answered) and listener.message not in received_but_not_printed:
         return passed(check)
+    if earlier["entry-points"].message in ("dangling", "function", "wrong-module", "misplaced"):
+        return blocked(check, "entry-points")
     for cause in ("talker-type", "talker-start", "listener-numeric"):
         silent_start = cause != "talker-start" or earlier[cause].message in ("silent", "not-numbers")
         if earlier[cause].status is not Status.PASS and silent_start:
-            return blocked(check, cause)
+            return blocked(check, *(earlier[cause].because or (cause,)))
     if not spoken:
         return failed(check, "nothing")
     shown = ", ".join(str(message.data) for message in spoken[:5]) + (" …" if len(spoken) > 5 else "")
@@ -123,11 +130,17 @@ def _answered(message: Message, view: View, scene: SceneView) -> bool:
     """Whether the listener printed that number after it was published, other than as part of a greeting."""
     texts = [str(other.data) for other in scene.messages if other.topic == view.specification.text_topic.name]
     near = [text for text in texts if str(message.data) in text]
-    listener = view.specification.numeric.listener
+    build = view.build
+    assert build is not None
+    listener = launched(view.specification.numeric.listener, build)
+    known = {line.source for line in scene.lines}
+    sources = (
+        {listener} if listener in known else known - {"launch", launched(view.specification.numeric.talker, build)}
+    )
     return any(
         message.data in numbers_in(line.text, near)
         for line in scene.lines
-        if line.source == listener and line.at >= message.at - 0.05
+        if line.source in sources and line.at >= message.at - 0.05
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
@@ -12,6 +13,8 @@ from lab2_grader.records import Endpoint, SceneName, Sent, Verdict
 
 Earlier = Mapping[str, Verdict]
 
+LITERAL = re.compile(r"\{[^{}]*\.data[^{}]*\}")  # what an f-string without its f prints
+AT_START = "at start"
 NOISE = 64  # so many different numbers that were never sent: whatever is sent would stand among them
 
 
@@ -20,7 +23,8 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
     check = "listener-numeric"
     scene = view.scene(SceneName.LISTENER)
     if scene is None:
-        return failed(check, "missing")
+        misplaced = earlier["entry-points"].message == "misplaced"
+        return blocked(check, "entry-points") if misplaced else failed(check, "missing")
     if scene.scene.fault:
         return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
     topic = view.specification.number_topic
@@ -28,17 +32,24 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
     printed = _numbers_printed(scene)
     missing = [row for row in sent if int(row.data) not in printed.get(row.at, frozenset())]
     strange = set().union(*printed.values()) - {int(row.data) for row in sent} if printed else set()
-    if sent and not missing:
+    if sent and not missing and _death(scene) != topic.name:
         return failed(check, "noise") if len(_plausible(strange)) > NOISE else passed(check)
-    died = scene.ended_by_itself(scene.scene.label)
-    if died and not any(row.topic == topic.name for row in scene.sent):
-        return failed(check, "died", error=scene.error_of(scene.scene.label))
-    if died and not any(row.topic != topic.name for row in scene.sent):
-        return failed(check, "died-on-number", error=scene.error_of(scene.scene.label))
+    if death := _death(scene):
+        if death == topic.name:
+            return failed(check, "died-on-number", error=scene.error_of(scene.scene.label))
+        if death == AT_START and scene.ended is not None and scene.ended.code == 0:
+            return failed(check, "ended")
+        if death == AT_START:
+            return failed(check, "died", error=scene.error_of(scene.scene.label))
+        return blocked(check, "listener-chatter")
     if wrong := _unsuitable(check, topic.name, topic.type, scene):
         return wrong
-    if died:
-        return failed(check, "died", error=scene.error_of(scene.scene.label))
+    if len(missing) > len(sent) // 2:
+        if literal := next((line for line in scene.lines if LITERAL.search(line.text)), None):
+            return failed(check, "no-f-string", shown=said(literal.text))
+        if strange := _plausible(strange):
+            shown = ", ".join(str(number) for number in sorted(strange)[:5])
+            return failed(check, "others", sent=", ".join(str(row.data) for row in sent[:5]), shown=shown)
     if len(missing) == len(sent):
         return failed(check, "silent", sent=len(sent), shown=_last_line(scene))
     examples = ", ".join(str(row.data) for row in missing[:5])
@@ -50,7 +61,7 @@ def listener_chatter(view: View, earlier: Earlier) -> Verdict:
     check = "listener-chatter"
     scene = view.scene(SceneName.LISTENER)
     if scene is None:
-        return blocked(check, "listener-numeric")
+        return blocked(check, *(earlier["listener-numeric"].because or ("listener-numeric",)))
     if scene.scene.fault:
         return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
     topic = view.specification.text_topic
@@ -59,20 +70,27 @@ def listener_chatter(view: View, earlier: Earlier) -> Verdict:
     missing = [row for row in sent if not any(at >= row.at and str(row.data) in text for at, text in lines)]
     if sent and not missing:
         return passed(check)
-    if earlier["listener-numeric"].message in ("died", "died-on-number"):
+    death = _death(scene)
+    if death == topic.name:
+        return failed(check, "died", error=scene.error_of(scene.scene.label))
+    if death and not missing:
         return blocked(check, "listener-numeric")
     if wrong := _unsuitable(check, topic.name, topic.type, scene):
         return wrong
-    if scene.ended_by_itself(scene.scene.label):
-        return failed(check, "died", error=scene.error_of(scene.scene.label))
     return failed(check, "silent", sent=len(sent), missing=len(missing), shown=_last_line(scene))
 
 
 def _sent(scene: SceneView, topic: str) -> list[Sent]:
     """What was sent there once both sides had found each other; before that nothing counts."""
-    found = [endpoint.at for endpoint in scene.appeared("subscription") if endpoint.topic == topic]
-    begin = max(scene.phases.get("send", float("inf")), min(found, default=0.0))
+    begin = scene.phases.get(f"send {topic}", float("inf"))
     return [row for row in scene.sent if row.topic == topic and row.at >= begin]
+
+
+def _death(scene: SceneView) -> str:
+    """The topic over whose message the listener ended, AT_START when nothing had been sent; empty when it lived."""
+    if not scene.ended_by_itself(scene.scene.label):
+        return ""
+    return scene.sent[-1].topic if scene.sent else AT_START
 
 
 def _numbers_printed(scene: SceneView) -> dict[float, frozenset[int]]:
@@ -108,6 +126,8 @@ def _unsuitable(check: str, topic: str, type_name: str, scene: SceneView) -> Ver
     right = [endpoint for endpoint in mine if endpoint.type == type_name]
     if all(endpoint.durability == "transient-local" for endpoint in right):
         return failed(check, "qos", found="transient local")
+    if not any(row.topic == topic for row in scene.sent):  # nobody matched, whatever the reason
+        return failed(check, "qos", found="a deadline or the like")
     return None
 
 

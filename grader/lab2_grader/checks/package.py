@@ -9,6 +9,7 @@ from lab2_grader.checks.verdicts import failed, inconclusive, passed
 from lab2_grader.checks.view import View, names
 from lab2_grader.near import nearest
 from lab2_grader.records import Build, EndedBy, Verdict
+from lab2_grader.stand_in import misdirected
 
 Earlier = Mapping[str, Verdict]
 
@@ -58,18 +59,32 @@ def entry_points(view: View, earlier: Earlier) -> Verdict:
         lost = [name for name in missing if name in original]
         if lost and len(lost) == len(missing):
             return failed(check, "replaced", name=lost[0], missing=names(lost), found=found)
-        for name in missing:
+        for name in (name for name in missing if name in numeric):
             if near := nearest(name, build.executables, (*numeric, *original)):
                 return failed(check, "near", name=name, near=near)
         return failed(check, "missing", name=missing[0], missing=names(missing), found=found)
     targets = {point.name: point.target for point in build.entry_points}
     for name in (*numeric, *original):
         if name in build.dangling:
-            return failed(check, "dangling", name=name, target=targets[name], modules=names(build.modules))
+            return _dangling(view, build, name, targets[name])
+        if module := misdirected(name, build):
+            return failed(check, "wrong-module", name=name, target=targets[name], module=module)
     for name in (*numeric, *original):
         if name in targets and _function_is_missing(view, name, targets[name]):
             return failed(check, "function", name=name, target=targets[name])
     return passed(check)
+
+
+def _dangling(view: View, build: Build, name: str, target: str) -> Verdict:
+    """An entry point that names no module of the package: perhaps the file is there, in the wrong folder."""
+    check, package = "entry-points", view.specification.package
+    if name not in build.modules:
+        paths = [source.path for source in view.evidence.submission.sources]
+        misplaced = next((p for p in paths if p.endswith(f"{name}.py") and p.rsplit("/", 1)[-1] == f"{name}.py"), "")
+        if misplaced and misplaced != f"{package}/{name}.py":
+            return failed(check, "misplaced", name=name, target=target, where=misplaced)
+    modules = names(module for module in build.modules if module != "__init__")
+    return failed(check, "dangling", name=name, target=target, modules=modules)
 
 
 def _function_is_missing(view: View, name: str, target: str) -> bool:

@@ -21,7 +21,8 @@ def talker_type(view: View, earlier: Earlier) -> Verdict:
     check = "talker-type"
     scene = view.talking
     if scene is None:
-        return failed(check, "missing")
+        misplaced = earlier["entry-points"].message == "misplaced"
+        return blocked(check, "entry-points") if misplaced else failed(check, "missing")
     if scene.scene.fault:
         return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
     topic = view.specification.number_topic
@@ -29,8 +30,14 @@ def talker_type(view: View, earlier: Earlier) -> Verdict:
     died = scene.ended_by_itself(view.talker_name)
     error = scene.error_of(view.talker_name)
     if died and not view.numbers:
-        wrong_message = publishers and ("TypeError" in error or "AttributeError" in error or "Assertion" in error)
-        return failed(check, "wrong-message" if wrong_message else "died", error=error, talker=view.talker_name)
+        if scene.ended is not None and scene.ended.code == 0 and scene.scene.label:
+            return failed(check, "ended", talker=view.talker_name)
+        key = "died"
+        if publishers and "TypeError" in error:
+            key = "wrong-message"
+        elif publishers and "(field)" in error:  # the assertion of the message's conversion to C
+            key = "wrong-data"
+        return failed(check, key, error=error, talker=view.talker_name)
     if not publishers:
         return _elsewhere(view)
     types = {endpoint.type for endpoint in publishers}
@@ -112,7 +119,9 @@ def talker_wrap(view: View, earlier: Earlier) -> Verdict:
     if sequel.stays:
         return failed(check, "stuck", shown=around(sequel.values, sequel.stays[0].index))
     if wrong := next((step for step in sequel.returns if not _returns_well(step, rise, view)), None):
-        return _bad_return(wrong, sequel, view)
+        # In steps of two a count can jump over the number at which it would be set back.
+        skipped = rise > 1 and wrong.after != topic.smallest
+        return blocked(check, "talker-step") if skipped else _bad_return(wrong, sequel, view)
     outside = next((i for i, v in enumerate(sequel.values) if not topic.smallest <= v <= topic.largest), None)
     if outside is not None:
         key = "too-large" if sequel.values[outside] > topic.largest else "negative"
@@ -156,7 +165,7 @@ def talker_chatter(view: View, earlier: Earlier) -> Verdict:
     check = "talker-chatter"
     scene = view.talking
     if scene is None:
-        return blocked(check, "talker-type")
+        return blocked(check, *(earlier["talker-type"].because or ("talker-type",)))
     if scene.scene.fault:
         return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
     topic = view.specification.text_topic
@@ -165,8 +174,10 @@ def talker_chatter(view: View, earlier: Earlier) -> Verdict:
         if all(endpoint.reliability == "best-effort" for endpoint in publishers):
             return failed(check, "best-effort")
         return passed(check)
-    if earlier["talker-type"].message in ("died", "wrong-message"):
+    if earlier["talker-type"].message in ("died", "ended", "wrong-message"):
         return blocked(check, "talker-type")
+    if publishers and earlier["talker-start"].message == "silent":
+        return blocked(check, "talker-start")
     if publishers:
         if overwritten := source.overwritten_publisher(view):
             attribute, file, line = overwritten
@@ -190,8 +201,8 @@ def _unheard(check: str, view: View, earlier: Earlier) -> Verdict | None:
         return inconclusive(check, "inconclusive-scene", fault=view.talking.scene.fault if view.talking else "")
     if view.numbers:
         return None
-    if base.status is Status.FAIL:
-        return blocked(check, "talker-type")
+    if base.status in (Status.FAIL, Status.BLOCKED):
+        return blocked(check, *(base.because or ("talker-type",)))
     if check == "talker-start":
         return failed(check, "silent")
     return blocked(check, "talker-start")

@@ -24,6 +24,7 @@ from lab2_grader.records import (
     Sent,
     Unsupported,
 )
+from lab2_grader.stand_in import launched
 
 TRACEBACK = "Traceback (most recent call last):"
 
@@ -87,6 +88,8 @@ class SceneView:
         running: dict[str, int] = {}
         for process in self.seen:
             running[process.executable] = running.get(process.executable, 0) + 1
+        if running:
+            announced.pop("ros2", None)  # `ros2 run` as a process: what it ran was seen under its own name
         return {
             name: announced.get(name, 0) or running.get(name, 0) for name in sorted(announced.keys() | running.keys())
         }
@@ -155,9 +158,11 @@ class View:
 
     @cached_property
     def talker_name(self) -> str:
-        """The executable that stood for the talker."""
-        scene = self.talking
-        return (scene.scene.label if scene else "") or self.specification.numeric.talker
+        """The executable or module that stood for the talker."""
+        scene, name = self.talking, self.specification.numeric.talker
+        if scene is not None and scene.scene.label:
+            return scene.scene.label
+        return launched(name, self.build) if self.build else name
 
     @cached_property
     def number_publishers(self) -> list[Endpoint]:

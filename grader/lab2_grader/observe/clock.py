@@ -17,7 +17,7 @@ from lab2_grader.records import Clock, Measured, Message, Phase, Tick
 
 FIRST_JUMP_SECONDS = 10.0
 PROBE_SECONDS = 0.05  # ROS time moved at a time while the period is measured
-PROBE_WAIT_SECONDS = 0.01
+PROBE_WAIT_SECONDS = (0.004, 0.05)  # at least and at most; in between a few times what the talker takes to answer
 STEP_WAIT_SECONDS = 0.05
 FIRST_WAIT_SECONDS = 1.0
 HOLD_SECONDS = 0.1  # how long the clock stands still, at least, to see whether the node does too
@@ -150,8 +150,11 @@ class LockStep:
 
         False when the talker falls silent, or ends, before that.
         """
+        began = time.monotonic()
         self._advance(FIRST_JUMP_SECONDS)
         self._wait(len(self._heard()), FIRST_WAIT_SECONDS)
+        shortest, longest = PROBE_WAIT_SECONDS
+        patience = min(max(3 * (time.monotonic() - began), shortest), longest)
         intervals = []
         took = 0.0
         for _ in range(3):
@@ -161,7 +164,7 @@ class LockStep:
                     return False
                 self._advance(PROBE_SECONDS)
                 probes += 1
-                self._wait(before, PROBE_WAIT_SECONDS)
+                self._wait(before, patience)
             intervals.append(probes)
             took = time.monotonic() - began
         # The interval after the first jump may be short of a whole period, so it does not count.

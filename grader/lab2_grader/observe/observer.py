@@ -52,8 +52,7 @@ class Observer:
         recorder: Where everything observed goes.
 
     What a scene's script needs to decide what to do next is kept here too: `messages`, `lines`, `endpoints`,
-    `nodes`, `ended_executables`; `graph_changed_at` and `busy_at` say when the graph last changed and when a process
-    was last seen to want the processor.
+    `ended_executables`.
     """
 
     def __init__(self, recorder: Recorder) -> None:
@@ -61,9 +60,8 @@ class Observer:
         self.messages: list[Message] = []
         self.lines: list[Line] = []
         self.endpoints: dict[str, Endpoint] = {}
-        self.nodes: tuple[str, ...] = ()
-        self.graph_changed_at = 0.0
-        self.busy_at = 0.0
+        self._changed_at = 0.0
+        self._nodes: frozenset[str] = frozenset()
         self.ended: ProgramEnded | None = None
         self._context = Context()
         # Without log files there is nothing that the observer must be able to write.
@@ -134,9 +132,9 @@ class Observer:
         if self._program is None:
             return
         found = {info.pid: info for info in process.tree(self._program.pid)} if self._program.running else {}
+        if found and process.busy(self._program.pid):
+            self._changed_at = self.recorder.now()
         marker = f"/lib/{lab.specification().package}/"
-        if any(info.busy for info in found.values()):
-            self.busy_at = self.recorder.now()
         for pid, info in found.items():
             if pid not in self._processes:
                 script = next((part for part in info.command[:2] if marker in part), "")
@@ -174,14 +172,26 @@ class Observer:
 
     # --- the graph --------------------------------------------------------------------------
 
+    def nodes(self) -> frozenset[str]:
+        """Fully qualified names of the other nodes."""
+        found = self.node.get_node_names_and_namespaces()
+        return frozenset(f"{space.rstrip('/')}/{name}" for name, space in found if name != self.name)
+
+    @property
+    def quiet_seconds(self) -> float:
+        """For how long nothing has happened: the graph did not change, and no process of the program had work to do.
+
+        Unlike a time on the wall clock, this is not used up while the machine keeps the program waiting.
+        """
+        return self.recorder.now() - self._changed_at
+
     def look_at_graph(self) -> None:
         """Record which endpoints came and went, and subscribe to what is published as it is offered."""
         now = self.recorder.now()
-        named = self.node.get_node_names_and_namespaces()
-        nodes = tuple(sorted(f"{space.rstrip('/')}/{name}" for name, space in named if name != self.name))
-        if nodes != self.nodes:
-            self.nodes = nodes
-            self.graph_changed_at = now
+        nodes = self.nodes()
+        if nodes != self._nodes:
+            self._nodes = nodes
+            self._changed_at = now
         found: dict[str, Endpoint] = {}
         for topic, _ in self.node.get_topic_names_and_types():
             if topic in HOUSEKEEPING_TOPICS[:2]:
@@ -197,7 +207,7 @@ class Observer:
         for gid, endpoint in found.items():
             if gid not in self.endpoints:
                 self.recorder.write(endpoint)
-                self.graph_changed_at = now
+                self._changed_at = now
                 if endpoint.kind == "publisher" and endpoint.topic not in HOUSEKEEPING_TOPICS:
                     reliable, lasting = endpoint.reliability == "reliable", endpoint.durability == "transient-local"
                     self.listen(endpoint.topic, endpoint.type, reliable, lasting)
@@ -205,7 +215,7 @@ class Observer:
             gone = self.endpoints[gid]
             fields = (gone.kind, gid, gone.node, gone.topic, gone.type, gone.reliability, gone.durability)
             self.recorder.write(Endpoint(now, "gone", *fields))
-            self.graph_changed_at = now
+            self._changed_at = now
         self.endpoints = found
 
     def _endpoint(self, now: float, kind: str, gid: str, topic: str, info: Any) -> Endpoint:

@@ -7,17 +7,18 @@ from collections.abc import Callable
 
 from lab2_grader import lab
 from lab2_grader.observe.clock import LockStep
-from lab2_grader.observe.observer import Observer
+from lab2_grader.observe.observer import Observer, message_class
 from lab2_grader.reading import numbers_in, said
 from lab2_grader.records import Clock, Measured, Message, Phase, SceneName, ScenePlan, Sent
 
-NO_PROCESS_SECONDS = 8.0  # a launch that has started none of the package's executables by then will not
-BUSY_PATIENCE = 5
+NO_NODE_SECONDS = 8.0  # a program that has done nothing for so long, and is no node yet, will not become one
 WARM_UP_TRIES = 4
 WARM_UP_SECONDS = 0.5
 PARTIAL_LINE_SECONDS = 0.2
 PATIENCE = 2  # after so many answers in a row that did not come, the next are waited for only briefly
-BRIEF_SECONDS = 0.3
+MATCH_SECONDS = 3.0  # from a subscription in the graph to one that is matched; one that asks for more never is
+BRIEF_SECONDS = 0.15
+LAST_WORD_SECONDS = 0.3  # after what was sent last, nothing happened for so long
 RECENT = 20  # lines and messages back that can belong to the tick that was just made
 
 
@@ -55,22 +56,10 @@ def _start(observer: Observer, plan: ScenePlan, wanted: frozenset[tuple[str, str
         return wanted <= {(endpoint.kind, endpoint.topic) for endpoint in observer.endpoints.values()}
 
     def settled() -> bool:
-        """Everything that runs is in the graph and waits, and the graph has not changed for a while.
-
-        A process that wants the processor may still be starting on a busy machine; one that always wants it is given
-        a few times as long.
-        """
-        now = observer.recorder.now()
-        since_change, since_busy = now - observer.graph_changed_at, now - observer.busy_at
-        if (
-            min(since_change, since_busy) < limits.settle_seconds
-            and since_change < BUSY_PATIENCE * limits.settle_seconds
-        ):
-            return False
-        running = len(observer.executables()) if not plan.label else 1
-        if running == 0:
-            return time.monotonic() - began > NO_PROCESS_SECONDS
-        return len(observer.nodes) >= running
+        """Everything that runs is in the graph, and nothing has happened for a while."""
+        running = 1 if plan.label else len(observer.executables())
+        present = 0 < running <= len(observer.nodes())
+        return observer.quiet_seconds > (limits.settle_seconds if present else NO_NODE_SECONDS)
 
     observer.until(lambda: complete() or settled() or not observer.alive(), limits.seconds)
     if complete():
@@ -87,19 +76,20 @@ class _Ear:
         self._seconds = seconds
         self._misses = 0
 
-    def hears(self, fits: Callable[[str], bool], since: int) -> bool:
-        """Whether a line after the first *since* fits, now or soon."""
+    def hears(self, fits: Callable[[str], bool], since: int, seconds: float | None = None) -> bool:
+        """Whether a line after the first *since* fits, now or soon (within *seconds*, which then proves nothing)."""
         lines = self._observer.lines
 
         def heard() -> bool:
             return any(line.source == self._source and fits(line.text) for line in lines[since:])
 
-        patience = self._seconds if self._misses < PATIENCE else BRIEF_SECONDS
+        patience = seconds or (self._seconds if self._misses < PATIENCE else BRIEF_SECONDS)
         if not self._observer.until(heard, min(patience, PARTIAL_LINE_SECONDS)):
             self._observer.finish_lines()
             self._observer.until(lambda: heard() or not self._observer.alive(), patience)
         found = heard()
-        self._misses = 0 if found else self._misses + 1
+        if seconds is None:
+            self._misses = 0 if found else self._misses + 1
         return found
 
 
@@ -109,12 +99,12 @@ def _conversation(observer: Observer, plan: ScenePlan) -> None:
     topics = (specification.number_topic, specification.text_topic)
     for topic in topics:
         observer.listen(topic.name, topic.type)
-    steps = LockStep(observer, plan.clock, specification.numeric.talker)
+    steps = LockStep(observer, plan.clock, plan.talker)
     wanted = frozenset((kind, topic.name) for kind in ("publisher", "subscription") for topic in topics)
     _start(observer, plan, wanted)
     if plan.clock is Clock.TIME_LAPSE:
-        observer.until(lambda: steps.followers() >= len(observer.nodes), lab.limits().start.settle_seconds)
-    ear = _Ear(observer, specification.numeric.listener, limits.answer_seconds)
+        observer.until(lambda: steps.followers() >= len(observer.nodes()), lab.limits().start.settle_seconds)
+    ear = _Ear(observer, plan.listener, limits.answer_seconds)
 
     def answer(message: Message) -> None:
         if isinstance(message.data, int):
@@ -152,56 +142,93 @@ def _number_topic(observer: Observer) -> str:
     return next(others, wanted)
 
 
+class _Post:
+    """Sends to one topic what was made up, and waits for each to be printed.
+
+    The first messages may be lost while the two sides still discover each other. So the first that was made up is sent
+    until it is answered, a few times at most; what follows the phase `send <topic>` counts. Where nobody subscribes in a
+    way that fits, nothing is sent.
+    """
+
+    def __init__(self, observer: Observer, topic: str, type_name: str, data: tuple[int | str, ...], ear: _Ear) -> None:
+        self._observer = observer
+        self._topic = topic
+        self._type_name = type_name
+        self._type = message_class(type_name)
+        self._publisher = observer.publisher(topic, type_name)
+        self._warm_up, *self._pending = data
+        self._ear = ear
+
+    def prepare(self) -> None:
+        """Find the subscription and warm up; without one, or when the listener ends over it, nothing is pending."""
+
+        def matched() -> bool:
+            return bool(self._publisher.get_subscription_count())
+
+        if self._subscribed():
+            self._observer.until(lambda: matched() or not self._observer.alive(), MATCH_SECONDS)
+        if not matched():
+            self._pending.clear()
+        for _ in range(WARM_UP_TRIES if self.pending else 0):
+            if self._send(self._warm_up, WARM_UP_SECONDS) or not self._observer.alive():
+                break
+        _phase(self._observer, f"send {self._topic}")
+
+    def _subscribed(self) -> bool:
+        wanted = ("subscription", self._topic, self._type_name)
+        return any((found.kind, found.topic, found.type) == wanted for found in self._observer.endpoints.values())
+
+    @property
+    def pending(self) -> int:
+        """How many are still to be sent."""
+        return len(self._pending) if self._observer.alive() else 0
+
+    def send_next(self) -> None:
+        """Send one and wait for the answer."""
+        self._send(self._pending.pop(0))
+
+    def _send(self, data: int | str, seconds: float | None = None) -> bool:
+        since = len(self._observer.lines)
+        assert self._type is not None
+        self._publisher.publish(self._type(data=data))
+        self._observer.recorder.write(Sent(self._observer.recorder.now(), self._topic, data))
+        return self._ear.hears(_prints(data), since, seconds)
+
+
 def _listener(observer: Observer, plan: ScenePlan) -> None:
-    """The listener by itself: the grader publishes what it made up and waits for each to be printed."""
+    """The listener by itself: the grader publishes what it made up and waits for each to be printed.
+
+    Texts come first, so that a listener that falls over the first number has still shown what it does with them.
+    """
     specification, limits = lab.specification(), lab.limits().listener
     number_topic, text_topic = specification.number_topic, specification.text_topic
-    numbers = observer.publisher(number_topic.name, number_topic.type)
-    texts = observer.publisher(text_topic.name, text_topic.type)
+
+    def ear() -> _Ear:
+        return _Ear(observer, plan.label, limits.answer_seconds)
+
+    numbers = _Post(observer, number_topic.name, number_topic.type, plan.numbers, ear())
+    texts = _Post(observer, text_topic.name, text_topic.type, plan.texts, ear())
     wanted = frozenset(("subscription", topic.name) for topic in (number_topic, text_topic))
     _start(observer, plan, wanted)
-    ears = {topic.name: _Ear(observer, plan.label, limits.answer_seconds) for topic in (number_topic, text_topic)}
-
-    def send(publisher: object, topic: str, data: int | str, patience: float | None = None) -> bool:
-        since = len(observer.lines)
-        message = (Int8 if isinstance(data, int) else String)(data=data)
-        publisher.publish(message)  # type: ignore[attr-defined]
-        observer.recorder.write(Sent(observer.recorder.now(), topic, data))
-        fits = _has_number(data) if isinstance(data, int) else _has_text(data)
-        if patience is None:
-            return ears[topic].hears(fits, since)
-        return observer.until(lambda: any(fits(line.text) for line in observer.lines[since:]), patience)
-
-    from std_msgs.msg import Int8, String
-
-    # The first messages may be lost while the two sides still discover each other: these do not count.
-    _phase(observer, "warm-up")
-    for publisher, topic, data in (
-        (numbers, number_topic.name, plan.numbers[0]),
-        (texts, text_topic.name, plan.texts[0]),
-    ):
-        if publisher.get_subscription_count() and observer.alive():
-            any(send(publisher, topic, data, WARM_UP_SECONDS) for _ in range(WARM_UP_TRIES))
-    _phase(observer, "send")
-    pending = list(plan.texts[1:])
-    every = max(1, len(plan.numbers) // max(1, len(pending)))
-    for index, number in enumerate(plan.numbers[1:]):
-        if not observer.alive():
-            break
-        send(numbers, number_topic.name, number)
-        if index % every == 0 and pending:
-            send(texts, text_topic.name, pending.pop(0))
-    for text in pending:
-        if observer.alive():
-            send(texts, text_topic.name, text)
+    texts.prepare()
+    for _ in range(texts.pending // 2):
+        texts.send_next()
+    numbers.prepare()
+    every = max(1, numbers.pending // max(1, texts.pending))
+    while numbers.pending:
+        numbers.send_next()
+        if numbers.pending % every == 0 and texts.pending:
+            texts.send_next()
+    while texts.pending:
+        texts.send_next()
+    # What is printed late counts too, however slow the machine is.
+    observer.until(lambda: observer.quiet_seconds > LAST_WORD_SECONDS or not observer.alive(), limits.answer_seconds)
 
 
-def _has_number(number: int) -> Callable[[str], bool]:
-    return lambda line: number in numbers_in(line)
-
-
-def _has_text(text: str) -> Callable[[str], bool]:
-    return lambda line: text in said(line)
+def _prints(data: int | str) -> Callable[[str], bool]:
+    if isinstance(data, int):
+        return lambda line: data in numbers_in(line)
+    return lambda line: data in said(line)
 
 
 def _originals(observer: Observer, plan: ScenePlan) -> None:
@@ -214,8 +241,8 @@ def _originals(observer: Observer, plan: ScenePlan) -> None:
 
     def enough() -> bool:
         heard = [str(message.data) for message in observer.messages if message.topic == topic.name]
-        printed = [line.text for line in observer.lines if line.source == specification.original.listener]
+        printed = [line.text for line in observer.lines if line.source == plan.listener]
         answered = sum(any(text in line for line in printed) for text in set(heard))
-        return len(heard) >= limits.messages and answered >= limits.messages - 1
+        return answered >= limits.messages
 
     observer.until(lambda: enough() or not observer.alive(), limits.seconds)

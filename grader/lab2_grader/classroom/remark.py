@@ -1,0 +1,110 @@
+"""Judges the recorded evidence of one submission or a whole class again, and says whose mark changed and why."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lab2_grader import pipeline
+from lab2_grader.classroom import results, summary
+from lab2_grader.errors import Lab2Error, UsageError
+from lab2_grader.lab import Rubric
+from lab2_grader.records import ClassState, Record, Result
+
+
+class Change(Record, frozen=True):
+    """A mark that is another now; `why` names each check that counts differently."""
+
+    name: str
+    was: str
+    now: str
+    why: tuple[str, ...]
+
+
+class Remarked(Record, frozen=True):
+    """What judging again came to; `failed` are (name, reason) of those whose evidence could not be judged."""
+
+    count: int
+    changes: tuple[Change, ...]
+    failed: tuple[tuple[str, str], ...]
+
+
+def rescore(root: Path, rubric: Rubric) -> Remarked:
+    """Judge what is recorded in *root* again: a result's folder, or a folder of such folders.
+
+    All are judged before the first is written, so that an interruption leaves either mark, and never half a class
+    without the table of changes.
+
+    Raises:
+        UsageError: There is no evidence in *root*, or somebody else is writing there.
+    """
+    if (root / pipeline.EVIDENCE).is_dir():
+        return _rescore([root], rubric)
+    folders = sorted(path.parent for path in root.glob(f"*/{pipeline.EVIDENCE}"))
+    if not folders:
+        raise UsageError(f"There is no evidence in {root}. Give a folder that `grade` or `grade-all` wrote.")
+    with results.locked(root):
+        done = _rescore(folders, rubric)
+        if (root / summary.JSON).is_file():
+            _sum_up(root, rubric)
+        return done
+
+
+def _rescore(folders: list[Path], rubric: Rubric) -> Remarked:
+    judged: list[tuple[Path, Result]] = []
+    failed: list[tuple[str, str]] = []
+    changes: list[Change] = []
+    for folder in folders:
+        try:
+            result = pipeline.rescore(folder, rubric)
+        except Lab2Error as error:
+            failed.append((folder.name, str(error)))
+            continue
+        judged.append((folder, result))
+        change = _change(folder.name, results.result(folder), result)
+        if change is not None:
+            changes.append(change)
+    for folder, result in judged:
+        pipeline.write_reports(folder, result)
+    return Remarked(len(judged), tuple(changes), tuple(failed))
+
+
+def _change(name: str, old: Result | None, new: Result) -> Change | None:
+    was, now = _mark(old), _mark(new)
+    if was == now:
+        return None
+    before = {check.id: check for check in old.checks} if old else {}
+    why = []
+    for check in new.checks:
+        earlier = before.pop(check.id, None)
+        if earlier is None:
+            why.append(f"{check.id} is new")
+        elif earlier.status is not check.status:
+            why.append(f"{check.id} was {earlier.status.value}, is {check.status.value}")
+        elif (earlier.points, earlier.max_points) != (check.points, check.max_points):
+            why.append(
+                f"{check.id} ({check.status.value}) counted {earlier.points} of {earlier.max_points}, "
+                f"counts {check.points} of {check.max_points}"
+            )
+    why += [f"{check} is gone" for check in before]
+    return Change(name, was, now, tuple(why))
+
+
+def _mark(result: Result | None) -> str:
+    if result is None:
+        return "none"
+    return f"{result.score} of {result.max_score}" if result.graded else "withheld"
+
+
+def _sum_up(root: Path, rubric: Rubric) -> None:
+    """Bring the summary of the class up to date with the results."""
+    old = summary.read(root)
+    lines, found = [], []
+    for line in old.lines:
+        folder = root / line.name
+        result, stamp = results.result(folder), results.stamp(folder)
+        if line.state in (ClassState.GRADED, ClassState.WITHHELD) and result is not None and stamp is not None:
+            found.append(result)
+            lines.append(summary.line_of(line.name, result, stamp, folder))
+        else:
+            lines.append(line)
+    summary.write(root, summary.summarise(lines, found, rubric, old.unknown))
