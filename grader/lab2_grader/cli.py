@@ -20,13 +20,15 @@ from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
 
-from lab2_grader import __version__, lab, pipeline, process, ros, sandbox
+from lab2_grader import __version__, bag, doctor, evidence, lab, pipeline, process, report, ros, sandbox
+from lab2_grader.checks import verdicts
 from lab2_grader.classroom import gradebook, remark, run
 from lab2_grader.classroom.progress import Progress
-from lab2_grader.checks import verdicts
 from lab2_grader.errors import Lab2Error, RefusedError, UsageError
-from lab2_grader.records import ClassState, Clock, Result
-from lab2_grader.report.terminal import terminal
+from lab2_grader.outlets import GithubJob, Gradescope, Outlet
+from lab2_grader.records import ClassState, Clock, Evidence, Result
+from lab2_grader.report import Audience, github
+from lab2_grader.report.terminal import plain, terminal
 
 GRADED, BELOW, USAGE, NOT_GRADED, INTERRUPTED = 0, 1, 2, 3, 130
 PLAIN_WIDTH = 110  # columns when the output is no terminal
@@ -47,10 +49,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         err.print("Interrupted. What was recorded so far is kept; nothing is left running.")
         return INTERRUPTED
     except RefusedError as error:
-        err.print(Text(f"Refused: {error}"))
+        err.print(Text(github.defused(f"Refused: {error}")), soft_wrap=True)
         return error.exit_code
     except Lab2Error as error:
-        err.print(Text(str(error)))
+        err.print(Text(github.defused(str(error))), soft_wrap=True)
         return error.exit_code
     except BrokenPipeError:
         return NOT_GRADED
@@ -79,6 +81,8 @@ def _parser() -> argparse.ArgumentParser:
     grade.add_argument("--clock", type=Clock, choices=list(Clock), default=Clock.TIME_LAPSE, help="how time is driven")
     grade.add_argument("--isolation", choices=("auto", "off"), default="auto", help="off: run it with your own rights")
     grade.add_argument("--fail-under", type=int, metavar="N", help="exit with 1 when the mark is below N")
+    grade.add_argument("--ci", action="store_true", help="in a GitHub workflow: job summary, annotations, outputs")
+    grade.add_argument("--gradescope", type=Path, metavar="DIR", help="Gradescope's folder, /autograder there")
     grade.set_defaults(run=_grade)
 
     grade_all = commands.add_parser("grade-all", help="grade a class; go on where an earlier call stopped")
@@ -122,6 +126,19 @@ def _parser() -> argparse.ArgumentParser:
     rescore.add_argument("--rubric", type=Path, help="a rubric of your own")
     rescore.set_defaults(run=_rescore)
 
+    show = commands.add_parser("report", help="show a result in another format, or its messages as a recording")
+    show.add_argument("result", type=Path, help="the folder of a result")
+    show.add_argument("--format", choices=tuple(report.FORMATS), help="print this format (default: a table)")
+    show.add_argument(
+        "--audience", type=Audience, choices=list(Audience), default=Audience.STUDENT, help="who reads it"
+    )
+    show.add_argument("--output", type=Path, metavar="FILE", help="write the format to FILE instead")
+    show.add_argument("--bag", type=Path, metavar="DIR", help="write what was observed as rosbag2 recordings (MCAP)")
+    show.set_defaults(run=_report)
+
+    examine = commands.add_parser("doctor", help="look at this machine and say what would get in the way")
+    examine.set_defaults(run=_doctor)
+
     explain = commands.add_parser("explain", help="what a check asks and how it is judged")
     explain.add_argument("check", nargs="?", help="the id of a check; without one, all are listed")
     explain.set_defaults(run=_explain)
@@ -132,19 +149,52 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _grade(arguments: argparse.Namespace) -> int:
-    means = pipeline.Means(
-        ros.find(arguments.ros), _isolation(arguments), lab.rubric(arguments.rubric), arguments.clock
-    )
-    if not means.isolation.on:
-        err.print(Text(sandbox.protections_off(means.isolation), style="bold yellow"))
-        if means.isolation.mend:
-            err.print(Text(f"To mend it: {means.isolation.mend}"))
+    outlets = _outlets(arguments)
     destination = arguments.out or (lambda name: pipeline.results_folder(Path("results"), name))
-    with _Progress(arguments.submission) as progress:
-        result, folder = pipeline.grade(arguments.submission, destination, means, progress)
-    out.print(terminal(result))
-    out.print(Text(f"Reports and evidence: {folder}"))
-    return _exit_code(result, arguments.fail_under)
+
+    def publish(result: Result, observed: Evidence, stage: str) -> None:
+        for outlet in outlets:
+            _print_lines(outlet.stage(result, observed, stage))
+
+    try:
+        for outlet in outlets:
+            _print_lines(outlet.began())
+        means = _means(arguments)
+        with _Progress(arguments.submission) as progress:
+            result, folder = pipeline.grade(arguments.submission, destination, means, progress, publish)
+    except Exception as error:
+        for outlet in outlets:
+            _print_lines(outlet.failed(error))
+        raise
+    if arguments.ci:
+        _print_lines(tuple(github.defused(line) for line in plain(result)))
+    else:
+        out.print(terminal(result))
+    out.print(Text(f"Reports and evidence: {folder}"), soft_wrap=True)
+    fail_under = arguments.fail_under
+    if arguments.ci and fail_under is None and lab.course().fail_workflow_on_lost_points:
+        fail_under = result.max_score
+    return _exit_code(result, fail_under)
+
+
+def _means(arguments: argparse.Namespace) -> pipeline.Means:
+    isolation = _isolation(arguments)
+    if not isolation.on:
+        err.print(Text(sandbox.protections_off(isolation), style="bold yellow"))
+        if isolation.mend:
+            err.print(Text(f"To mend it: {isolation.mend}"))
+    return pipeline.Means(ros.find(arguments.ros), isolation, lab.rubric(arguments.rubric), arguments.clock)
+
+
+def _outlets(arguments: argparse.Namespace) -> tuple[Outlet, ...]:
+    job = (GithubJob(arguments.submission),) if arguments.ci else ()
+    return (*job, Gradescope(arguments.gradescope)) if arguments.gradescope else job
+
+
+def _print_lines(lines: tuple[str, ...]) -> None:
+    """Print *lines* as they are, none of them wrapped: a workflow command is a whole line."""
+    for line in lines:
+        out.print(Text(line), soft_wrap=True)
 
 
 def _isolation(arguments: argparse.Namespace) -> sandbox.Isolation:
@@ -206,6 +256,37 @@ def _fill(arguments: argparse.Namespace) -> int:
         if names:
             out.print(Text(f"{heading}: {', '.join(names)}"))
     return GRADED
+
+
+def _report(arguments: argparse.Namespace) -> int:
+    result, observed = pipeline.read(arguments.result)
+    if arguments.bag is not None:
+        for path in bag.write(observed, arguments.bag):
+            out.print(Text(f"Recording: {path}"), soft_wrap=True)
+    if arguments.format is None:
+        if arguments.bag is None:
+            out.print(terminal(result))
+        return _exit_code(result, None)
+    text = report.FORMATS[arguments.format](report.report_of(result, observed, arguments.audience))
+    if arguments.output is None:
+        sys.stdout.buffer.write(text.encode("utf-8", "replace"))
+        sys.stdout.flush()
+    else:
+        evidence.write_atomically(arguments.output, text.encode("utf-8", "replace"))
+    return _exit_code(result, None)
+
+
+def _doctor(_arguments: argparse.Namespace) -> int:
+    findings = doctor.examine(doctor.look_around())
+    for finding in findings:
+        mark = ("✓ ", "green") if finding.well else ("✗ ", "bold red")
+        out.print(Text.assemble(mark, (f"{finding.what}: ", "bold"), finding.found), soft_wrap=True)
+        if not finding.well:
+            out.print(Text(f"    should be: {finding.wanted}"), soft_wrap=True)
+            out.print(Text(f"    to mend it: {finding.mend}"), soft_wrap=True)
+    ill = sum(not finding.well for finding in findings)
+    out.print(Text(f"{ill} of {len(findings)} things need mending." if ill else "Nothing needs mending."))
+    return BELOW if ill else GRADED
 
 
 def _rescore(arguments: argparse.Namespace) -> int:

@@ -37,6 +37,23 @@ class Refusal(Record, frozen=True):
     text: str
 
 
+class Ill(Record, frozen=True):
+    """One way in which a machine is unwell: what is found and the command that mends it, with placeholders."""
+
+    found: str
+    mend: str
+    symptom: str = ""
+
+
+class DoctorTexts(Record, frozen=True):
+    """What `doctor` says of one thing: its name, that it is well, what it should be, and the ways to be unwell."""
+
+    what: str
+    well: str
+    wanted: str
+    ill: dict[str, Ill]
+
+
 class Catalogue(Record, frozen=True):
     """`messages.toml`."""
 
@@ -44,6 +61,7 @@ class Catalogue(Record, frozen=True):
     status: dict[str, str]
     note: dict[str, str]
     refusal: dict[str, Refusal]
+    doctor: dict[str, DoctorTexts]
     report: dict[str, str]
 
 

@@ -11,7 +11,7 @@ import msgspec
 
 from lab2_grader import __version__, checks, evidence, messages, process, report, sandbox, submission
 from lab2_grader.build import build
-from lab2_grader.errors import FaultError
+from lab2_grader.errors import FaultError, UsageError
 from lab2_grader.lab import Rubric
 from lab2_grader.records import (
     Build,
@@ -138,6 +138,22 @@ def rescore(folder: Path, rubric: Rubric) -> Result:
     """
     observed = evidence.read(folder / EVIDENCE)
     return score(observed, checks.judge(observed), rubric, evidence.digest(folder / EVIDENCE))
+
+
+def read(folder: Path) -> tuple[Result, Evidence]:
+    """The result in *folder* as it was judged, and its evidence.
+
+    Raises:
+        UsageError: Either is not there, damaged, or of another version.
+    """
+    path = folder / report.RESULT
+    try:
+        result = msgspec.json.decode(path.read_bytes(), type=Result)
+    except OSError as error:
+        raise UsageError(f"There is no result at {path} ({error.strerror}). Grade the submission first.") from error
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path} is damaged: {error}. Grade the submission again.") from error
+    return result, evidence.read(folder / EVIDENCE)
 
 
 def write_reports(folder: Path, result: Result) -> None:

@@ -17,6 +17,8 @@ from lab2_grader.report.junit import junit
 from lab2_grader.report.markdown import markdown
 from lab2_grader.report.view import Audience, Report, report_of
 
+__all__ = ["FORMATS", "RESULT", "Audience", "Report", "as_json", "files", "report_of"]
+
 RESULT = "result.json"
 
 
@@ -39,9 +41,13 @@ def files(result: Result, evidence: Evidence) -> tuple[tuple[str, bytes], ...]:
     """(name, content) of every file that a result is written to; `staff.html` and `result.json` are not for students."""
     student, staff = report_of(result, evidence), report_of(result, evidence, Audience.STAFF)
     return (
-        ("report.html", html(student).encode()),
-        ("report.md", markdown(student).encode()),
-        ("junit.xml", junit(student).encode()),
-        ("staff.html", html(staff).encode()),
-        (RESULT, as_json(staff).encode()),
+        ("report.html", _bytes(html(student))),
+        ("report.md", _bytes(markdown(student))),
+        ("junit.xml", _bytes(junit(student))),
+        ("staff.html", _bytes(html(staff))),
+        (RESULT, _bytes(as_json(staff))),
     )
+
+
+def _bytes(text: str) -> bytes:
+    return text.encode("utf-8", "replace")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from lab2_grader.checks.view import TRACEBACK, SceneView, View
 from lab2_grader.records import EndedBy, Endpoint, Message, Phase, ProcessGone, ProcessSeen, ProgramEnded, SceneName
@@ -134,7 +135,7 @@ def _numbers(view: View) -> Extract | None:
 def _places(numbers: Sequence[Message]) -> list[int]:
     """Where the next number is not one more than the last."""
     found = []
-    for index, (before, after) in enumerate(zip(numbers, numbers[1:], strict=False), start=1):
+    for index, (before, after) in enumerate(pairwise(numbers), start=1):
         if not (isinstance(before.data, int) and isinstance(after.data, int) and after.data == before.data + 1):
             found.append(index)
             if len(found) == PLACES:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -18,6 +19,7 @@ from lab2_grader.report.words import STATUS_MARKS, STATUS_WORDS, in_short, left_
 from lab2_grader.sections import section_link, symptom_link
 
 TEMPLATES = Path(__file__).parent / "templates"
+WIDE, NARROW = 760, 350  # CSS pixels
 CODE = re.compile("`([^`]+)`")
 
 
@@ -98,7 +100,12 @@ def sequence_said(sequence: Conversation | None) -> str:
 def _graph_said(graph: Graph | None) -> str:
     if graph is None:
         return messages.report("graph-none")
-    right = all(part.mark is Mark.OK for part in (*graph.nodes, *graph.topics, *graph.edges))
+    marks = (
+        {node.mark for node in graph.nodes}
+        | {topic.mark for topic in graph.topics}
+        | {edge.mark for edge in graph.edges}
+    )
+    right = marks <= {Mark.OK}
     return messages.report("graph-right" if right else "graph-differs")
 
 
@@ -107,26 +114,42 @@ def _judged(check: str) -> str:
     return messages.fill(f"{texts.judged} {texts.ruling}", **known(check))
 
 
-def _sequence(sequence: Conversation | None) -> Markup | None:
+@dataclass(frozen=True)
+class _Picture:
+    """A picture drawn twice: for a wide page and for a phone, of which one is shown."""
+
+    wide: Markup
+    narrow: Markup
+
+
+def _sequence(sequence: Conversation | None) -> _Picture | None:
     if sequence is None:
         return None
-    return Markup(
-        sequence_svg(
-            sequence.observed,
-            sequence.expected,
-            id_prefix="sequence",
-            title=f"Numbers on {sequence.topic}",
-            departure=sequence.departure,
-            width=760,
+
+    def drawn(prefix: str, width: int) -> Markup:
+        return Markup(
+            sequence_svg(
+                sequence.observed,
+                sequence.expected,
+                id_prefix=prefix,
+                title=f"Numbers on {sequence.topic}",
+                departure=sequence.departure,
+                width=width,
+            )
         )
-    )
+
+    return _Picture(drawn("sequence-wide", WIDE), drawn("sequence-narrow", NARROW))
 
 
 def _graph(graph: Graph, prefix: str, title: str) -> Markup:
     return Markup(graph_svg(graph.nodes, graph.topics, graph.edges, id_prefix=prefix, title=title))
 
 
-def _timeline(timeline: Timeline) -> Markup | None:
+def _timeline(timeline: Timeline) -> _Picture | None:
     if not timeline.rows:
         return None
-    return Markup(timeline_svg(timeline.rows, id_prefix="timeline", title="How long it took", width=760))
+
+    def drawn(prefix: str, width: int) -> Markup:
+        return Markup(timeline_svg(timeline.rows, id_prefix=prefix, title="How long it took", width=width))
+
+    return _Picture(drawn("timeline-wide", WIDE), drawn("timeline-narrow", NARROW))

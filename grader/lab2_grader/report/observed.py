@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from lab2_grader import lab
 from lab2_grader.checks.view import SceneView, View
@@ -82,7 +83,7 @@ def conversation(view: View) -> Conversation | None:
         return None
     numbered = [message.number for message in messages]
     observed: list[float | None] = []
-    if all(later > earlier for earlier, later in zip(numbered, numbered[1:], strict=False)) and numbered[0] > 0:
+    if all(later > earlier for earlier, later in pairwise(numbered)) and numbered[0] > 0:
         for message in messages:
             while len(observed) < min(message.number - 1, MAX_NUMBERS):
                 observed.append(None)

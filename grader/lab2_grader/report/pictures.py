@@ -369,7 +369,7 @@ def first_departure(observed: Sequence[float | None], expected: Sequence[float])
 
     A gap, where nothing was seen, is no departure.
     """
-    pairs = enumerate(zip(observed, expected))
+    pairs = enumerate(zip(observed, expected, strict=False))
     return next((index for index, (seen, asked) in pairs if seen is not None and seen != asked), None)
 
 
@@ -515,7 +515,7 @@ def strip_svg(strips: Sequence[Strip], *, id_prefix: str, title: str, desc: str 
     width = max(wide, written) + 2 * _PAD
     parts: list[str] = []
     y = 6.0
-    for strip, (label, note) in zip(strips, texts):
+    for strip, (label, note) in zip(strips, texts, strict=True):
         kind = strip.mark.value
         parts.append(
             f'<text x="{_PAD:.0f}" y="{y + 14:.0f}"><tspan class="{kind}" font-weight="600">{escape(label)}</tspan>'

@@ -61,3 +61,12 @@ def _help(check: CheckResult) -> list[RenderableType]:
     rows.add_row("try", Text(f"{check.hint}{where}"))
     rows.add_row("worksheet", Text(f"section {check.section}"))
     return [Padding(rows, (0, 0, 1, 4))]
+
+
+def plain(result: Result) -> tuple[str, ...]:
+    """The same as lines for a log: each begins with words of ours, whatever a submission said."""
+    lines = [f"Mark: {mark(result)}"]
+    for check in result.checks:
+        line = f"{STATUS_MARKS[check.status]} {check.id}: {STATUS_WORDS[check.status]}, {check.points} of {check.max_points}"
+        lines.append(line if check.status is Status.PASS else f"{line}. {check.observed}")
+    return (*lines, *(f"Note: {note}" for note in result.notes))

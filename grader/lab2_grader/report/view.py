@@ -23,7 +23,7 @@ from lab2_grader.report.observed import (
     timeline,
 )
 
-HELD_BACK = (Status.FAIL, Status.PARTIAL, Status.BLOCKED, Status.INCONCLUSIVE)
+HELD_BACK = (Status.FAIL, Status.PARTIAL, Status.INCONCLUSIVE)
 
 
 class Audience(str, Enum):
@@ -72,9 +72,13 @@ class Report:
 
     @property
     def to_do(self) -> tuple[CheckResult, ...]:
-        """The checks that did not earn their points, what can be mended first, what waits for another check last."""
-        held = [check for check in self.result.checks if check.status in HELD_BACK]
-        return tuple(sorted(held, key=lambda check: check.status is Status.BLOCKED))
+        """The checks that did not earn their points and wait for no other."""
+        return tuple(check for check in self.result.checks if check.status in HELD_BACK)
+
+    @property
+    def waiting(self) -> tuple[CheckResult, ...]:
+        """The checks that another one blocks."""
+        return tuple(check for check in self.result.checks if check.status is Status.BLOCKED)
 
     @property
     def passed(self) -> tuple[CheckResult, ...]:

@@ -33,10 +33,12 @@ def in_short(result: Result) -> str:
     """The result in a sentence: all done, how much is left, or why there is no mark."""
     if not result.graded:
         return messages.report("withheld")
-    left = sum(check.status in (Status.FAIL, Status.PARTIAL, Status.BLOCKED) for check in result.checks)
+    left = sum(check.status in (Status.FAIL, Status.PARTIAL) for check in result.checks)
+    waiting = sum(check.status is Status.BLOCKED for check in result.checks)
     if left == 0:
         return messages.report("all-passed")
-    return messages.report("one-to-do") if left == 1 else messages.report("to-do", count=left)
+    said = messages.report("one-to-do") if left == 1 else messages.report("to-do", count=left)
+    return f"{said} {messages.report('waits', count=waiting)}" if waiting else said
 
 
 def left_out(result: Result) -> str:

@@ -30,7 +30,7 @@ USUAL_FILES = {
 }
 
 
-def annotations(report: Report, below: str = "", errors: bool = False) -> tuple[str, ...]:
+def workflow_commands(report: Report, below: str = "", errors: bool = False) -> tuple[str, ...]:
     """One command for each check that can be mended now, at most nine, and one that counts the rest.
 
     Args:
