@@ -9,7 +9,7 @@ from lab2_grader.checks.sequence import Sequel, Step, analyse, around
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
 from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
-from lab2_grader.records import Status, Verdict
+from lab2_grader.records import SceneName, Status, Verdict
 
 Earlier = Mapping[str, Verdict]
 
@@ -29,6 +29,8 @@ def talker_type(view: View, earlier: Earlier) -> Verdict:
     publishers = view.number_publishers
     died = scene.ended_by_itself(view.talker_name)
     error = scene.error_of(view.talker_name)
+    if died and not view.numbers and scene.scene.name is SceneName.CONVERSATION:
+        return blocked(check, "entry-points")  # there was nothing else that could be run in its place
     if died and not view.numbers:
         if scene.ended is not None and scene.ended.code == 0 and scene.scene.label:
             return failed(check, "ended", talker=view.talker_name)
