@@ -18,6 +18,7 @@ CAUGHT = re.compile(r"Caught (?:multiple exceptions?|exception) .*?: ?(.*)$")
 NO_EXECUTABLE = re.compile(r"executable '([^']*)' not found on the libexec directory")
 NO_PACKAGE = re.compile(r"""[Pp]ackage ['"][^'"]*['"] not found""")
 NEARBY, NEARBY_PER_MESSAGE = 100, 2  # lines that can belong to a message: so many, and so many for each before it
+NOT_WHAT_IT_RECEIVES = ("silent", "others", "noise", "no-f-string")  # a listener whose lines answer nothing
 ENOUGH_ANSWERS = 8  # of the slow dozen; the first few may be lost while the pair still discovers each other
 
 
@@ -105,8 +106,7 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
     printed = _printed(view, scene, spoken)
     answered = [message for message in spoken if message.data in printed]
     listener = earlier["listener-numeric"]
-    received_but_not_printed = ("silent", "some", "noise", "died-on-number")
-    if _is_conversation(spoken, answered) and listener.message not in received_but_not_printed:
+    if _is_conversation(spoken, answered) and listener.message not in NOT_WHAT_IT_RECEIVES:
         return passed(check)
     if earlier["entry-points"].message in ("dangling", "function", "wrong-module", "misplaced"):
         return blocked(check, "entry-points")
