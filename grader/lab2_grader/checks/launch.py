@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from lab2_grader.checks import source
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
 from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
@@ -41,7 +42,8 @@ def launch_starts(view: View, earlier: Earlier) -> Verdict:
     if asked := NO_EXECUTABLE.search(error):
         if asked[1] in (numeric.talker, numeric.listener):
             return blocked(check, "entry-points")
-        return failed(check, "no-executable", asked=asked[1], found=names(build.executables))
+        file, line = source.written_in(view, _launch_source(view), asked[1])
+        return failed(check, "no-executable", file, line, asked=asked[1], found=names(build.executables))
     if any(name not in build.executables for name in missing) and earlier["entry-points"].status is Status.FAIL:
         return blocked(check, "entry-points")
     if NO_PACKAGE.search(error):
@@ -82,7 +84,8 @@ def launch_only_numeric(view: View, earlier: Earlier) -> Verdict:
     started = scene.started()
     others = [name for name in started if name not in numeric]
     if others:
-        return failed(check, "others", others=names(others))
+        file, line = source.written_in(view, _launch_source(view), others[0])
+        return failed(check, "others", file, line, others=names(others))
     if not started or launch_error(scene):
         return blocked(check, *(earlier["launch-starts"].because or ("launch-starts",)))
     # Two of one in the place of the other is one fault, and launch-starts has it.
@@ -164,6 +167,11 @@ def _our_fault(check: str, scene: SceneView) -> Verdict | None:
     if scene.scene.fault:
         return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
     return None
+
+
+def _launch_source(view: View) -> str:
+    """The launch file within the package."""
+    return f"launch/{view.specification.numeric.launch_file}"
 
 
 def launch_error(scene: SceneView) -> str:
