@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from lab2_grader.checks import source
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
 from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
@@ -35,14 +36,15 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
     if sent and not missing and _death(scene) != topic.name:
         return failed(check, "noise") if len(_plausible(strange)) > NOISE else passed(check)
     if death := _death(scene):
+        file, line = scene.place_of_error(scene.scene.label, view.specification.package)
         if death == topic.name:
-            return failed(check, "died-on-number", error=scene.error_of(scene.scene.label))
+            return failed(check, "died-on-number", file, line, error=scene.error_of(scene.scene.label))
         if death == AT_START and scene.ended is not None and scene.ended.code == 0:
             return failed(check, "ended")
         if death == AT_START:
-            return failed(check, "died", error=scene.error_of(scene.scene.label))
+            return failed(check, "died", file, line, error=scene.error_of(scene.scene.label))
         return blocked(check, "listener-chatter")
-    if wrong := _unsuitable(check, topic.name, topic.type, scene):
+    if wrong := _unsuitable(check, topic.name, topic.type, view, scene):
         return wrong
     if len(missing) > len(sent) // 2:
         if literal := next((line for line in scene.lines if LITERAL.search(line.text)), None):
@@ -72,10 +74,11 @@ def listener_chatter(view: View, earlier: Earlier) -> Verdict:
         return passed(check)
     death = _death(scene)
     if death == topic.name:
-        return failed(check, "died", error=scene.error_of(scene.scene.label))
+        file, line = scene.place_of_error(scene.scene.label, view.specification.package)
+        return failed(check, "died", file, line, error=scene.error_of(scene.scene.label))
     if death and not missing:
         return blocked(check, "listener-numeric")
-    if wrong := _unsuitable(check, topic.name, topic.type, scene):
+    if wrong := _unsuitable(check, topic.name, topic.type, view, scene):
         return wrong
     return failed(check, "silent", sent=len(sent), missing=len(missing), shown=_last_line(scene))
 
@@ -111,7 +114,7 @@ def _plausible(numbers: set[int]) -> set[int]:
     return {number for number in numbers if -128 <= number <= 127}
 
 
-def _unsuitable(check: str, topic: str, type_name: str, scene: SceneView) -> Verdict | None:
+def _unsuitable(check: str, topic: str, type_name: str, view: View, scene: SceneView) -> Verdict | None:
     """Why the listener could receive nothing on *topic*, as the graph shows it; None when it could."""
     subscriptions = scene.appeared("subscription")
     mine = [endpoint for endpoint in subscriptions if endpoint.topic == topic]
@@ -119,10 +122,12 @@ def _unsuitable(check: str, topic: str, type_name: str, scene: SceneView) -> Ver
         others = {endpoint.topic for endpoint in subscriptions if not endpoint.topic.startswith("/parameter")}
         near = _near_subscription(topic, type_name, subscriptions)
         if near:
-            return failed(check, "near-topic", near=near, near_name=near.lstrip("/"))
+            file, line = source.written(view, scene.scene.label, near)
+            return failed(check, "near-topic", file, line, near=near, near_name=near.lstrip("/"))
         return failed(check, "no-subscription", others=names(others))
     if all(endpoint.type != type_name for endpoint in mine):
-        return failed(check, "wrong-type", found=names(endpoint.type for endpoint in mine))
+        file, line = source.written(view, scene.scene.label, topic)
+        return failed(check, "wrong-type", file, line, found=names(endpoint.type for endpoint in mine))
     right = [endpoint for endpoint in mine if endpoint.type == type_name]
     if all(endpoint.durability == "transient-local" for endpoint in right):
         return failed(check, "qos", found="transient local")

@@ -29,9 +29,7 @@ def originals_kept(view: View, earlier: Earlier) -> Verdict:
     printed = [
         message
         for message in texts
-        if any(
-            str(message.data) in line.text for line in scene.lines_of(original.listener) if line.at >= message.at - 0.05
-        )
+        if any(str(message.data) in line.text for line in scene.lines_of(original.listener))
     ]
     started = scene.started()
     missing = [name for name in pair if name not in started]

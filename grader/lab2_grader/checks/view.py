@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from functools import cached_property
 
@@ -124,6 +125,14 @@ class SceneView:
         if limit:
             return f"it struck the limit of {limit}"
         return next((reading.said(text) for text in reversed(texts) if text.strip()), "it printed nothing")
+
+    def place_of_error(self, source: str, package: str) -> tuple[str, int]:
+        """(file within the package, line) that the last traceback of *source* names last; ("", 0) when it names none."""
+        texts = [line.text for line in self.lines if line.source == source]
+        found = [
+            match for text in texts if (match := re.search(rf'File "[^"]*/({package}/[\w/]+\.py)", line (\d+)', text))
+        ]
+        return (found[-1][1], int(found[-1][2])) if found else ("", 0)
 
 
 class View:

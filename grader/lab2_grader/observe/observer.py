@@ -6,6 +6,7 @@ import importlib
 import queue
 import re
 import secrets
+import threading
 import time
 from collections.abc import Callable
 from pathlib import PurePosixPath
@@ -37,6 +38,7 @@ from lab2_grader.text import clean
 
 HOUSEKEEPING_TOPICS = ("/rosout", "/parameter_events", "/clock")
 TYPE_NAME = re.compile(r"^([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)$")
+MOST_TYPES = 5  # of one topic that are listened to
 QUEUE_DEPTH = 1000  # the observer never loses what it could have heard
 GRAPH_POLL_SECONDS = 0.02
 PROCESS_POLL_SECONDS = 0.1
@@ -71,6 +73,9 @@ class Observer:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._subscribed: set[Handle] = set()
+        self._types: dict[str, list[str]] = {}  # of each topic, in the order in which they were met
+        self._more_nodes: list[Node] = []
+        self._heard: queue.SimpleQueue[Message] = queue.SimpleQueue()
         self._output: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
         self._program: process.Process | None = None
         self._splitters: dict[str, OutputLines] = {}
@@ -239,7 +244,8 @@ class Observer:
         # A reliable publisher is heard by the same subscription whether or not it keeps old messages for late comers.
         handle = (topic, type_name, reliable, False if reliable else lasting)
         message_type = message_class(type_name)
-        if handle in self._subscribed or message_type is None:
+        known = self._types.get(topic, [])
+        if handle in self._subscribed or message_type is None or (len(known) >= MOST_TYPES and type_name not in known):
             return
         self._subscribed.add(handle)
         qos = QoSProfile(
@@ -252,11 +258,36 @@ class Observer:
             data = getattr(message, "data", None)
             kept = clean(data, 1000) if isinstance(data, str) else data if isinstance(data, int | float) else None
             number = int(info["publication_sequence_number"] or 0)
-            row = Message(self.recorder.now(), topic, type_name, number, kept)
+            self._heard.put(Message(self.recorder.now(), topic, type_name, number, kept))
+            self._executor.wake()
+
+        self._node_for(topic, type_name).create_subscription(message_type, topic, heard, qos)
+
+    def _node_for(self, topic: str, type_name: str) -> Node:
+        """The node that subscribes to *topic* as that type.
+
+        One participant of the middleware cannot know one topic under two types, so each further type of a topic needs
+        a participant of its own, which spins in a thread of its own.
+        """
+        types = self._types.setdefault(topic, [])
+        if type_name not in types:
+            types.append(type_name)
+        rank = types.index(type_name)
+        while len(self._more_nodes) < rank:
+            context = Context()
+            rclpy.init(args=["--ros-args", "--disable-external-lib-logs"], context=context)
+            node = Node(self.name, context=context, enable_rosout=False, start_parameter_services=False)
+            executor = SingleThreadedExecutor(context=context)
+            executor.add_node(node)
+            threading.Thread(target=executor.spin, name=self.name, daemon=True).start()
+            self._more_nodes.append(node)
+        return self._more_nodes[rank - 1] if rank else self.node
+
+    def _drain_heard(self) -> None:
+        while not self._heard.empty():
+            row = self._heard.get()
             self.messages.append(row)
             self.recorder.write(row)
-
-        self.node.create_subscription(message_type, topic, heard, qos)
 
     def publisher(self, topic: str, type_name: str) -> Publisher[Any]:
         """A publisher of the observer's own, with the default quality of service."""
@@ -269,6 +300,7 @@ class Observer:
     def spin(self, seconds: float) -> None:
         """Let at most one thing happen, waiting no longer than *seconds*; look around when it is time to."""
         self._executor.spin_once(timeout_sec=seconds)
+        self._drain_heard()
         self._drain_output()
         now = time.monotonic()
         if now >= self._next_graph:

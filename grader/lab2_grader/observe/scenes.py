@@ -81,7 +81,7 @@ class _Ear:
         lines = self._observer.lines
 
         def heard() -> bool:
-            return any(line.source == self._source and fits(line.text) for line in lines[since:])
+            return any(line.source in (self._source, "ros2") and fits(line.text) for line in lines[since:])
 
         patience = seconds or (self._seconds if self._misses < PATIENCE else BRIEF_SECONDS)
         if not self._observer.until(heard, min(patience, PARTIAL_LINE_SECONDS)):
