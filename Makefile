@@ -62,14 +62,15 @@ isolation: # bubblewrap, where it can be had
 			apt-get update -qq && apt-get install -y -qq bubblewrap >/dev/null || echo "bubblewrap could not be installed."; \
 		fi; }
 
-browser: # Chromium and axe-core for the tests of pages, where they can be had; the tests say when they are missing
+browser: # Chromium, axe-core and actionlint for the tests, where they can be had; the tests say when they are missing
 	@command -v chromium >/dev/null || { \
 		if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 			echo "Installing chromium …"; \
 			apt-get update -qq && apt-get install -y -qq chromium >/dev/null || echo "chromium could not be installed."; \
 		fi; }
-	@[ -d worksheet/tests/node_modules ] || { ! command -v npm >/dev/null || \
-		npm ci --silent --no-audit --no-fund --prefix worksheet/tests || echo "axe-core could not be installed."; }
+	@for folder in worksheet/tests grader/tests; do \
+		[ -d $$folder/node_modules ] || { ! command -v npm >/dev/null || \
+		npm ci --silent --no-audit --no-fund --prefix $$folder || echo "$$folder: npm could not install."; }; done
 
 # --- grading ------------------------------------------------------------------------------------
 
@@ -90,6 +91,16 @@ doctor: setup ## say what this machine has and how to mend what is missing
 
 worksheet: setup ## build the student and the staff edition into build/worksheet
 	@$(WITH) $(BIN)/python -m lab2_worksheet build
+
+gradescope: setup ## make the zip that Gradescope takes, in dist
+	@$(BIN)/python grader/gradescope/make_zip.py dist/lab2-gradescope.zip
+	@echo dist/lab2-gradescope.zip
+
+release: setup-dev ## make what students and assistants get, in dist/students
+	@$(WITH) $(BIN)/python grader/release/make_release.py students dist
+
+release-solutions: setup-dev ## make the solution and the staff edition, in dist/solutions; refuses before their date
+	@$(WITH) $(BIN)/python grader/release/make_release.py solutions dist
 
 # --- development --------------------------------------------------------------------------------
 
