@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,17 @@ from lab2_grader import lab, pipeline, ros, sandbox
 from lab2_grader.records import Result
 
 ROOT = Path(__file__).resolve().parents[2]
+
+# What the samples change in the solution: (file, what stands there, what takes its place).
+SAMPLES = {
+    "middling": (
+        ("lab2/numeric_talker.py", "        self.string_publisher.publish(message)\n", ""),
+        ("lab2/numeric_talker.py", "number.data = self.counter", "number.data = (self.counter + 128) % 256 - 128"),
+        ("lab2/numeric_talker.py", "LARGEST_NUMBER = 127", "LARGEST_NUMBER = 100_000"),
+        ("setup.py", "            'numeric_listener = lab2.numeric_listener:main',\n", ""),
+    ),
+    "broken": (("setup.py", "'listener = lab2.listener:main',", "'listener = lab2.listener:main'("),),
+}
 
 
 @pytest.fixture(scope="session")
@@ -22,3 +34,20 @@ def means() -> pipeline.Means:
 def solution_graded(means: pipeline.Means, tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Path]:
     """The solution, graded for real: its result and the folder that holds it."""
     return pipeline.grade(str(ROOT / "solution"), tmp_path_factory.mktemp("solution"), means, lambda doing: None)
+
+
+@pytest.fixture(scope="session")
+def samples(
+    means: pipeline.Means, solution_graded: tuple[Result, Path], tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, Path]:
+    """Folders of three results: a perfect, a middling and a broken submission, all graded for real."""
+    folders = {"perfect": solution_graded[1]}
+    for name, edits in SAMPLES.items():
+        package = tmp_path_factory.mktemp(name) / "lab2"
+        shutil.copytree(ROOT / "solution", package)
+        for file, find, replace in edits:
+            text = (package / file).read_text()
+            assert text.count(find) == 1, (file, find)
+            (package / file).write_text(text.replace(find, replace))
+        folders[name] = pipeline.grade(str(package), tmp_path_factory.mktemp(f"{name}-out"), means, lambda doing: None)[1]
+    return folders
