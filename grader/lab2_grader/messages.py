@@ -60,6 +60,7 @@ class Catalogue(Record, frozen=True):
     check: dict[str, CheckTexts]
     status: dict[str, str]
     note: dict[str, str]
+    phrase: dict[str, str]
     refusal: dict[str, Refusal]
     doctor: dict[str, DoctorTexts]
     report: dict[str, str]
@@ -95,6 +96,11 @@ def note(key: str, **values: Value) -> str:
 def report(key: str, **values: Value) -> str:
     """The sentence of `[report]` under *key*."""
     return fill(catalogue().report[key], **values)
+
+
+def phrase(key: str, **values: Value) -> str:
+    """The piece of a sentence of `[phrase]` under *key*, to be filled into another."""
+    return fill(catalogue().phrase[key], **values)
 
 
 def refusal(rule: str, **values: Value) -> RefusedError:

@@ -120,7 +120,7 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
     if not spoken:
         return failed(check, "nothing")
     shown = ", ".join(str(message.data) for message in spoken[:5]) + (" …" if len(spoken) > 5 else "")
-    return failed(check, "silent", shown=shown, printed=len(answered) or "none", count=len(spoken))
+    return failed(check, "silent", shown=shown, printed=len(answered), count=len(spoken))
 
 
 def _spoken(view: View, scene: SceneView) -> list[Message]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from lab2_grader import messages
 from lab2_grader.checks import source
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
 from lab2_grader.checks.view import SceneView, View, names
@@ -130,9 +131,9 @@ def _unsuitable(check: str, topic: str, type_name: str, view: View, scene: Scene
         return failed(check, "wrong-type", file, line, found=names(endpoint.type for endpoint in mine))
     right = [endpoint for endpoint in mine if endpoint.type == type_name]
     if all(endpoint.durability == "transient-local" for endpoint in right):
-        return failed(check, "qos", found="transient local")
+        return failed(check, "qos", found=messages.phrase("transient-local"))
     if not any(row.topic == topic for row in scene.sent):  # nobody matched, whatever the reason
-        return failed(check, "qos", found="a deadline or the like")
+        return failed(check, "qos", found=messages.phrase("other-qos"))
     return None
 
 
@@ -146,4 +147,4 @@ def _near_subscription(topic: str, type_name: str, subscriptions: list[Endpoint]
 
 def _last_line(scene: SceneView) -> str:
     lines = [said(line.text) for line in scene.lines if line.text.strip()]
-    return f"the last line it printed was '{lines[-1]}'" if lines else "it printed nothing at all"
+    return messages.phrase("last-line", line=lines[-1]) if lines else messages.phrase("no-line")

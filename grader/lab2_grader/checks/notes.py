@@ -56,9 +56,8 @@ def _stand_ins(view: View) -> list[str]:
     for name, program in wanted.items():
         scene = view.scene(name)
         if scene is not None and (scene.scene.started_with != "executable" or scene.scene.label != program):
-            found.append(
-                messages.note("stand-in", name=program, used=f"the {scene.scene.started_with} {scene.scene.label}")
-            )
+            kind, used = scene.scene.started_with, scene.scene.label
+            found.append(messages.note("stand-in", name=program, kind=kind, used=used))
     return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from lab2_grader import messages
 from lab2_grader.checks import source
 from lab2_grader.checks.verdicts import failed, inconclusive, passed
 from lab2_grader.checks.view import View, names
@@ -22,7 +23,7 @@ def package_builds(view: View, earlier: Earlier) -> Verdict:
     """The package is found and `colcon build` builds it."""
     check, build = "package-builds", view.build
     if build is None:
-        fault = view.evidence.faults[0] if view.evidence.faults else "the build was never reached"
+        fault = view.evidence.faults[0] if view.evidence.faults else messages.phrase("no-build")
         return inconclusive(check, "inconclusive-scene", fault=fault)
     if build.ok:
         return passed(check)
@@ -43,7 +44,7 @@ def package_builds(view: View, earlier: Earlier) -> Verdict:
 def _last_error(build: Build) -> str:
     found = [match[1] for line in build.log.splitlines() if (match := ERROR_LINE.match(line))]
     lines = [line for line in build.log.splitlines() if line.strip()]
-    return found[-1] if found else lines[-1] if lines else f"exit code {build.code}"
+    return found[-1] if found else lines[-1] if lines else messages.phrase("exit-code", code=str(build.code))
 
 
 def entry_points(view: View, earlier: Earlier) -> Verdict:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from functools import cached_property
 
-from lab2_grader import lab, reading
+from lab2_grader import lab, messages, reading
 from lab2_grader.records import (
     Build,
     EndedBy,
@@ -123,8 +123,8 @@ class SceneView:
                 return closing
         limit = self.ended.limit if self.ended is not None else ""
         if limit:
-            return f"it struck the limit of {limit}"
-        return next((reading.said(text) for text in reversed(texts) if text.strip()), "it printed nothing")
+            return messages.phrase("limit", limit=limit)
+        return next((reading.said(text) for text in reversed(texts) if text.strip()), messages.phrase("no-error"))
 
     def place_of_error(self, source: str, package: str) -> tuple[str, int]:
         """(file within the package, line) that the last traceback of *source* names last; ("", 0) when it names none."""
@@ -214,5 +214,5 @@ class View:
 
 
 def names(values: Iterable[str]) -> str:
-    """*values* as a list for people; a dash when there are none."""
-    return ", ".join(sorted(set(values))) or "nothing"
+    """*values* as a list for people; the phrase for nothing when there are none."""
+    return ", ".join(sorted(set(values))) or messages.phrase("nothing")
