@@ -109,7 +109,7 @@ def limits() -> dict[str, Value]:
         "processes": resources.processes,
         "memory": resources.memory_bytes // 1_000_000,
         "cpu": round(resources.cpu_seconds),
-        "file": resources.file_bytes // 1_000_000,
+        "file_size": resources.file_bytes // 1_000_000,
         "disk": build.disk_bytes // 1_000_000,
         "scratch": resources.scratch_bytes // 1_000_000,
         "install": build.install_bytes // 1_000_000,
