@@ -55,6 +55,11 @@ _run = {"name": os.environ.get(MARK) or _new_run()}
 os.register_at_fork(after_in_child=lambda: _run.update(name=_new_run()))
 
 
+def run_name() -> str:
+    """The name of this run of the grader: the mark of everything it starts begins with it and a dash."""
+    return _run["name"]
+
+
 def become_reaper() -> None:
     """Let orphaned descendants come back to this process, so that they can be found and killed (`prctl(2)`)."""
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
@@ -69,7 +74,7 @@ def environment(*names: str) -> tuple[tuple[str, str], ...]:
 def control_groups() -> cgroup.Base | None:
     """Where control groups can be made on this machine, tried with a real process; None where they cannot."""
     for found in cgroup.candidates():
-        group = cgroup.Group(found, f"{cgroup.PREFIX}{_run['name']}-probe")
+        group = cgroup.Group(found, f"{cgroup.PREFIX}{run_name()}-probe")
         try:
             group.make(Limits(seconds=10, processes=64, memory_bytes=100_000_000))
             tried = subprocess.run(group.wrap(("true",)), capture_output=True, timeout=10, cwd="/", check=False)
@@ -204,7 +209,7 @@ class Process:
         self._failure: Exception | None = None
         self._announcement = request.announces.encode() + b"\n" if request.announces else b""
         self._before = b""  # what came on standard error before the announcement
-        self._name = f"{_run['name']}-{next(_counter)}"
+        self._name = f"{run_name()}-{next(_counter)}"
         argv = request.argv
         if self._limits.file_bytes:
             argv = ("prlimit", f"--fsize={self._limits.file_bytes}", "--core=0", "--", *argv)
@@ -532,7 +537,7 @@ def temporary_directory() -> Iterator[Path]:
     path = Path(tempfile.mkdtemp(prefix="lab2-"))
     base = control_groups()
     with subprocess.Popen(
-        ["sh", "-c", CLEANER, "lab2-cleaner", str(path), _run["name"], MARK, *(base.paths() if base else ())],
+        ["sh", "-c", CLEANER, "lab2-cleaner", str(path), run_name(), MARK, *(base.paths() if base else ())],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
