@@ -91,6 +91,7 @@ class BuildLimits(Record, frozen=True):
     output_bytes: int
     disk_bytes: int
     install_bytes: int
+    files: int
 
 
 class StartLimits(Record, frozen=True):
@@ -143,6 +144,9 @@ class ResourceLimits(Record, frozen=True):
     scratch_bytes: int
     output_bytes: int
     line_bytes: int
+    lines: int
+    messages: int
+    topics: int
 
     def limits(self, seconds: float, output_bytes: int | None = None) -> Limits:
         """These limits for one run of at most *seconds*, keeping *output_bytes* of its output."""

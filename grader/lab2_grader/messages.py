@@ -106,3 +106,18 @@ def phrase(key: str, **values: Value) -> str:
 def refusal(rule: str, **values: Value) -> RefusedError:
     """The refusal under *rule*."""
     return RefusedError(rule, fill(catalogue().refusal[rule].text, **values))
+
+
+def limits() -> dict[str, Value]:
+    """The limits of `limits.toml` as the sentences that name one use them; sizes in MB."""
+    resources, build = lab.limits().resources, lab.limits().build
+    return {
+        "processes": resources.processes,
+        "memory": resources.memory_bytes // 1_000_000,
+        "cpu": round(resources.cpu_seconds),
+        "file_size": resources.file_bytes // 1_000_000,
+        "disk": build.disk_bytes // 1_000_000,
+        "scratch": resources.scratch_bytes // 1_000_000,
+        "install": build.install_bytes // 1_000_000,
+        "files": build.files,
+    }

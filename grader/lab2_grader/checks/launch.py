@@ -38,6 +38,8 @@ def launch_starts(view: View, earlier: Earlier) -> Verdict:
     missing = [name for name, executable in pair.items() if executable not in started]
     if not missing:
         return passed(check)
+    if unseen := [name for name in missing if name in scene.said_to_have_died()]:
+        return inconclusive(check, "inconclusive-unseen", name=names(unseen))
     error = launch_error(scene)
     if asked := NO_EXECUTABLE.search(error):
         if asked[1] in (numeric.talker, numeric.listener):
@@ -109,10 +111,18 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
     printed = _printed(view, scene, spoken)
     answered = [message for message in spoken if message.data in printed]
     listener = earlier["listener-numeric"]
-    if _is_conversation(spoken, answered) and listener.message not in NOT_WHAT_IT_RECEIVES:
+    build, numeric, topic = view.build, view.specification.numeric, view.specification.number_topic.name
+    assert build is not None
+    talker, own_listener = launched(numeric.talker, build), launched(numeric.listener, build)
+    theirs = scene.spoke(topic, talker) and scene.heard(topic, own_listener)
+    if theirs and _is_conversation(spoken, answered) and listener.message not in NOT_WHAT_IT_RECEIVES:
         return passed(check)
     if earlier["entry-points"].message in ("dangling", "function", "wrong-module", "misplaced"):
         return blocked(check, "entry-points")
+    if not scene.spoke(topic, talker):
+        speakers = {endpoint.program for endpoint in scene.appeared("publisher") if endpoint.topic == topic} - {talker}
+        others = names("another process" if program == "-" else program for program in speakers)
+        return failed(check, "strangers", others=others)
     for cause in ("talker-type", "talker-start", "listener-numeric"):
         silent_start = cause != "talker-start" or earlier[cause].message in ("silent", "not-numbers")
         if earlier[cause].status is not Status.PASS and silent_start:

@@ -33,9 +33,9 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
     sent = _sent(scene, topic.name)
     printed = _numbers_printed(scene)
     missing = [row for row in sent if int(row.data) not in printed.get(row.at, frozenset())]
-    strange = set().union(*printed.values()) - {int(row.data) for row in sent} if printed else set()
+    strange = frozenset[int]().union(*printed.values()) - {int(row.data) for row in sent}
     if sent and not missing and _death(scene) != topic.name:
-        return failed(check, "noise") if len(_plausible(strange)) > NOISE else passed(check)
+        return failed(check, "noise") if len(strange) > NOISE else passed(check)
     if death := _death(scene):
         file, line = scene.place_of_error(scene.scene.label, view.specification.package)
         if death == topic.name:
@@ -98,21 +98,21 @@ def _death(scene: SceneView) -> str:
 
 
 def _numbers_printed(scene: SceneView) -> dict[float, frozenset[int]]:
-    """For each message that was sent, the numbers that were printed from then on."""
+    """For each message that was sent, the numbers an Int8 can carry that were printed from then on."""
     texts = [str(row.data) for row in scene.sent if isinstance(row.data, str)]
-    lines = [(line.at, numbers_in(line.text, texts)) for line in scene.lines]
+    lines = [(line.at, _plausible(numbers_in(line.text, texts))) for line in scene.lines]
     found: dict[float, frozenset[int]] = {}
-    later: frozenset[int] = frozenset()
+    later: set[int] = set()
     for row in sorted(scene.sent, key=lambda row: row.at, reverse=True):
         while lines and lines[-1][0] >= row.at:
             later |= lines.pop()[1]
-        found[row.at] = later
+        found[row.at] = frozenset(later)
     return found
 
 
-def _plausible(numbers: set[int]) -> set[int]:
+def _plausible(numbers: frozenset[int]) -> frozenset[int]:
     """Those that an Int8 could have carried."""
-    return {number for number in numbers if -128 <= number <= 127}
+    return frozenset(number for number in numbers if -128 <= number <= 127)
 
 
 def _unsuitable(check: str, topic: str, type_name: str, view: View, scene: SceneView) -> Verdict | None:

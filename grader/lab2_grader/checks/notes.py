@@ -14,7 +14,15 @@ PARTICIPANT = 24  # hexadecimal digits of a gid that name the participant (DDSI-
 def notes(evidence: Evidence) -> tuple[str, ...]:
     """The notes on *evidence*, a sentence each."""
     view = View(evidence)
-    return (*evidence.faults, *_period(view), *_print(view), *_names(view), *_stand_ins(view), *_dropped(view))
+    return (
+        *evidence.faults,
+        *_period(view),
+        *_print(view),
+        *_names(view),
+        *_stand_ins(view),
+        *_limits(view),
+        *_dropped(view),
+    )
 
 
 def _period(view: View) -> list[str]:
@@ -61,6 +69,21 @@ def _stand_ins(view: View) -> list[str]:
     return found
 
 
+def _limits(view: View) -> list[str]:
+    """What was stopped because it used too much, with what to do about it."""
+    found = []
+    for scene in view.scenes():
+        if scene.ended is not None and scene.ended.limit:
+            about = messages.limits() | {"scene": scene.scene.name.value, "seconds": round(scene.ended.at)}
+            found.append(messages.note(f"limit-{scene.ended.limit}", **about))
+        if any("No space left on device" in line.text or "File too large" in line.text for line in scene.lines):
+            found.append(messages.note("limit-disk", **messages.limits() | {"scene": scene.scene.name.value}))
+    return found
+
+
 def _dropped(view: View) -> list[str]:
-    dropped = sum(int(scene.measured.get("dropped_bytes", 0)) for scene in view.scenes())
-    return [messages.note("output", bytes=dropped)] if dropped else []
+    found = []
+    for what, key in (("dropped_bytes", "output"), ("dropped_lines", "lines"), ("dropped_messages", "messages")):
+        if dropped := sum(int(scene.measured.get(what, 0)) for scene in view.scenes()):
+            found.append(messages.note(key, count=dropped))
+    return found

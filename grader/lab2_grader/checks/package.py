@@ -30,7 +30,7 @@ def package_builds(view: View, earlier: Earlier) -> Verdict:
     if build.ended_by is EndedBy.DEADLINE:
         return failed(check, "time", seconds=round(build.seconds))
     if build.ended_by is EndedBy.LIMIT:
-        return failed(check, "limit", what=build.limit)
+        return failed(check, f"limit-{build.limit}")
     if build.code == 0:
         return failed(check, "nothing-installed")
     error = _last_error(build)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import queue
 import re
 import secrets
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import PurePosixPath
 from typing import Any
 
+import msgspec
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -40,8 +43,11 @@ HOUSEKEEPING_TOPICS = ("/rosout", "/parameter_events", "/clock")
 TYPE_NAME = re.compile(r"^([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)$")
 MOST_TYPES = 5  # of one topic that are listened to
 QUEUE_DEPTH = 1000  # the observer never loses what it could have heard
+GRAPH_SHARE = 5  # at most one part in so many of the observer's time goes into looking at the graph
 GRAPH_POLL_SECONDS = 0.02
 PROCESS_POLL_SECONDS = 0.1
+QUICK_PROCESS_POLL_SECONDS = 0.02  # until the first message: what dies at once must have been seen
+PROCESS_ID = slice(4, 6)  # of an identity of Fast DDS (GUID prefix): the low half of the process's own pid
 UNSUPPORTED = "[lab2-launcher] unsupported: "
 
 Handle = tuple[str, str, bool, bool]
@@ -80,6 +86,9 @@ class Observer:
         self._program: process.Process | None = None
         self._splitters: dict[str, OutputLines] = {}
         self._processes: dict[int, str] = {}
+        self._table: dict[int, process.ProcessInfo] = {}
+        self._kept: Counter[str] = Counter()
+        self._dropped: Counter[str] = Counter()
         self.ended_executables: frozenset[str] = frozenset()
         self._next_graph = 0.0
         self._next_processes = 0.0
@@ -126,8 +135,9 @@ class Observer:
         by = outcome.ended_by
         self.ended = ProgramEnded(self.recorder.now(), outcome.code, outcome.signal, by, outcome.limit)
         self.recorder.write(self.ended)
-        if outcome.dropped_bytes:
-            self.recorder.write(Measured(self.recorder.now(), "dropped_bytes", outcome.dropped_bytes))
+        for what, count in (("dropped_bytes", outcome.dropped_bytes), *self._dropped.items()):
+            if count:
+                self.recorder.write(Measured(self.recorder.now(), what, count))
 
     def executables(self) -> frozenset[str]:
         """Names of the package's executables that are running now."""
@@ -137,6 +147,7 @@ class Observer:
         if self._program is None:
             return
         found = {info.pid: info for info in process.tree(self._program.pid)} if self._program.running else {}
+        self._table = found
         if found and process.busy(self._program.pid):
             self._changed_at = self.recorder.now()
         marker = f"/lib/{lab.specification().package}/"
@@ -153,6 +164,22 @@ class Observer:
                 self.ended_executables |= {executable}
                 by = EndedBy.GRADER if self._stopping else EndedBy.ITSELF
                 self.recorder.write(ProcessGone(self.recorder.now(), pid, by))
+
+    def _program_of(self, gid: str) -> str:
+        """Which executable of the package the endpoint *gid* belongs to, as `Endpoint.program` has it."""
+        number = int.from_bytes(bytes.fromhex(gid)[PROCESS_ID], "little")
+        if all(info.inside_pid & 0xFFFF != number for info in self._table.values()):
+            self._look_at_processes()
+        owners = {self._executable_of(pid) for pid, info in self._table.items() if info.inside_pid & 0xFFFF == number}
+        return owners.pop() if len(owners) == 1 else ""
+
+    def _executable_of(self, pid: int) -> str:
+        """The executable that *pid* is, or descends from; `-` when there is none."""
+        while pid in self._table:
+            if name := self._processes.get(pid):
+                return name
+            pid = self._table[pid].parent
+        return "-"
 
     # --- what it prints ---------------------------------------------------------------------
 
@@ -172,8 +199,17 @@ class Observer:
         for line in lines:
             if line.text.startswith(UNSUPPORTED) and line.source == "launch":
                 self.recorder.write(Unsupported(line.at, line.text[len(UNSUPPORTED) :]))
-            self.lines.append(line)
-            self.recorder.write(line)
+            if self._keeps("lines", "dropped_lines", lab.limits().resources.lines):
+                self.lines.append(line)
+                self.recorder.write(line)
+
+    def _keeps(self, what: str, dropped: str, limit: int) -> bool:
+        """Whether one more of *what* is kept: whoever floods us shall not fill our memory and our disk."""
+        self._kept[what] += 1
+        if self._kept[what] > limit:
+            self._dropped[dropped] += 1
+            return False
+        return True
 
     # --- the graph --------------------------------------------------------------------------
 
@@ -198,9 +234,7 @@ class Observer:
             self._nodes = nodes
             self._changed_at = now
         found: dict[str, Endpoint] = {}
-        for topic, _ in self.node.get_topic_names_and_types():
-            if topic in HOUSEKEEPING_TOPICS[:2]:
-                continue
+        for topic in self._topics():
             publishers = self.node.get_publishers_info_by_topic(topic)
             subscriptions = self.node.get_subscriptions_info_by_topic(topic) if topic != "/clock" else []
             for kind, infos in (("publisher", publishers), ("subscription", subscriptions)):
@@ -218,10 +252,17 @@ class Observer:
                     self.listen(endpoint.topic, endpoint.type, reliable, lasting)
         for gid in self.endpoints.keys() - found.keys():
             gone = self.endpoints[gid]
-            fields = (gone.kind, gid, gone.node, gone.topic, gone.type, gone.reliability, gone.durability)
-            self.recorder.write(Endpoint(now, "gone", *fields))
+            self.recorder.write(msgspec.structs.replace(gone, at=now, event="gone"))
             self._changed_at = now
         self.endpoints = found
+
+    def _topics(self) -> list[str]:
+        """The topics there are, the lab's own first, and no more of the others than are looked at in a scene."""
+        specification = lab.specification()
+        own = (specification.number_topic.name, specification.text_topic.name, "/clock")
+        found = {topic for topic, _ in self.node.get_topic_names_and_types()} - set(HOUSEKEEPING_TOPICS[:2])
+        ordered = [topic for topic in own if topic in found] + sorted(found.difference(own))
+        return ordered[: lab.limits().resources.topics]
 
     def _endpoint(self, now: float, kind: str, gid: str, topic: str, info: Any) -> Endpoint:
         qos = info.qos_profile
@@ -237,6 +278,7 @@ class Observer:
             type=clean(info.topic_type, 200),
             reliability="reliable" if reliable else "best-effort",
             durability="transient-local" if lasting else "volatile",
+            program=self._program_of(gid),
         )
 
     def listen(self, topic: str, type_name: str, reliable: bool = True, lasting: bool = False) -> None:
@@ -261,7 +303,9 @@ class Observer:
             self._heard.put(Message(self.recorder.now(), topic, type_name, number, kept))
             self._executor.wake()
 
-        self._node_for(topic, type_name).create_subscription(message_type, topic, heard, qos)
+        # A name that rclpy does not accept was not made with rclpy: nothing that is asked for is heard there.
+        with contextlib.suppress(ValueError, RuntimeError):
+            self._node_for(topic, type_name).create_subscription(message_type, topic, heard, qos)
 
     def _node_for(self, topic: str, type_name: str) -> Node:
         """The node that subscribes to *topic* as that type.
@@ -286,8 +330,9 @@ class Observer:
     def _drain_heard(self) -> None:
         while not self._heard.empty():
             row = self._heard.get()
-            self.messages.append(row)
-            self.recorder.write(row)
+            if self._keeps(row.topic, "dropped_messages", lab.limits().resources.messages):
+                self.messages.append(row)
+                self.recorder.write(row)
 
     def publisher(self, topic: str, type_name: str) -> Publisher[Any]:
         """A publisher of the observer's own, with the default quality of service."""
@@ -305,11 +350,12 @@ class Observer:
         now = time.monotonic()
         if now >= self._next_graph:
             self.look_at_graph()
-            self._next_graph = now + GRAPH_POLL_SECONDS * (1 if not self.messages else 10)
+            took = time.monotonic() - now
+            self._next_graph = now + max(GRAPH_SHARE * took, GRAPH_POLL_SECONDS * (1 if not self.messages else 10))
         if now >= self._next_processes:
             self._look_at_processes()
             self.recorder.flush()
-            self._next_processes = now + PROCESS_POLL_SECONDS
+            self._next_processes = now + (PROCESS_POLL_SECONDS if self.messages else QUICK_PROCESS_POLL_SECONDS)
 
     def until(self, condition: Callable[[], bool], seconds: float) -> bool:
         """Wait until *condition* holds, for at most *seconds*; whether it does."""

@@ -242,7 +242,7 @@ def _originals(observer: Observer, plan: ScenePlan) -> None:
     def enough() -> bool:
         heard = [str(message.data) for message in observer.messages if message.topic == topic.name]
         printed = [line.text for line in observer.lines if line.source == plan.listener]
-        answered = sum(any(text in line for line in printed) for text in set(heard))
+        answered = sum(any(text in line for line in printed) for text in set(heard[:RECENT]))
         return answered >= limits.messages
 
     observer.until(lambda: enough() or not observer.alive(), limits.seconds)
