@@ -149,6 +149,11 @@ def _descendants(root: int) -> dict[int, _Stat]:
     for name in os.listdir("/proc"):
         if name[0] in "123456789" and (found := _stat(int(name))) is not None:
             table[int(name)] = found
+    return _below(root, table)
+
+
+def _below(root: int, table: dict[int, _Stat]) -> dict[int, _Stat]:
+    """*root* and its descendants, as far as *table* has them."""
     children: dict[int, list[int]] = {}
     for pid, stat in table.items():
         children.setdefault(stat.parent, []).append(pid)
@@ -162,10 +167,43 @@ def _descendants(root: int) -> dict[int, _Stat]:
     return tree
 
 
+class _Family:
+    """`_descendants` of one process for those who ask again and again: nobody reads the whole machine's table each time.
+
+    A process never becomes a descendant of another than those it was born to, so who was seen to descend from somebody
+    else is not looked at again while it lives.
+    """
+
+    def __init__(self, root: int) -> None:
+        self.root = root
+        self._strangers: set[int] = set()
+
+    def living(self) -> dict[int, _Stat]:
+        """*root* and all its living descendants."""
+        pids = {int(name) for name in os.listdir("/proc") if name[0] in "123456789"}
+        self._strangers &= pids
+        table = {pid: stat for pid in pids - self._strangers if (stat := _stat(pid)) is not None}
+        tree = _below(self.root, table)
+        # One whose parent is not in the table may have been born while it was read: it is looked at again.
+        known = self._strangers | {0, 1, os.getpid()}
+        grown = True
+        while grown:
+            found = {pid for pid, stat in table.items() if stat.parent in known and pid not in tree and pid not in known}
+            known |= found
+            self._strangers |= found
+            grown = bool(found)
+        return tree
+
+
+@functools.lru_cache(maxsize=8)
+def _family(root: int) -> _Family:
+    return _Family(root)
+
+
 def tree(root: int) -> tuple[ProcessInfo, ...]:
     """The living processes below and including *root*, by pid, each with its arguments."""
     found = []
-    for pid in sorted(_descendants(root)):
+    for pid in sorted(_family(root).living()):
         try:
             raw = Path(f"/proc/{pid}/cmdline").read_bytes()
         except OSError:
@@ -177,7 +215,7 @@ def tree(root: int) -> tuple[ProcessInfo, ...]:
 
 def busy(root: int) -> bool:
     """Whether a thread of *root* or of its descendants runs, or waits for a processor or a disk."""
-    for pid in _descendants(root):
+    for pid in _family(root).living():
         with contextlib.suppress(OSError):
             for thread in Path(f"/proc/{pid}/task").iterdir():
                 text = (thread / "stat").read_bytes()
@@ -240,6 +278,7 @@ class Process:
             raise FaultError(f"{request.argv[0]} could not be started: {error.strerror}.") from error
         self.pid = self._popen.pid
         self._wake_write: int | None
+        self._family = _Family(self.pid)
         self._wake_read, self._wake_write = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
         self._wake_lock = threading.Lock()
         self._pump = threading.Thread(target=self._run, name=f"pump-{self.pid}", daemon=True)
@@ -409,7 +448,7 @@ class Process:
         if self._group is not None:
             struck = self._group.struck()
             return struck or ("cpu" if limits.cpu_seconds and self._group.cpu_seconds() > limits.cpu_seconds else "")
-        found = _descendants(self.pid).values()
+        found = self._family.living().values()
         if limits.processes and sum(stat.threads for stat in found) > limits.processes:
             return "processes"
         if limits.memory_bytes and sum(stat.resident for stat in found) > limits.memory_bytes:
