@@ -228,16 +228,18 @@ def _grade_all(arguments: argparse.Namespace) -> int:
             )
         )
     live = err.is_terminal
-    progress = Progress(None if live else lambda line: err.print(Text(line)))
+    progress = Progress(None if live else lambda line: err.print(Text(line), soft_wrap=True))
     with Live(progress, console=err, refresh_per_second=4) if live else nullcontext():
         summary = run.grade_class(order, progress)
     for item in summary.unknown:
-        out.print(Text(f"Not understood: {item.what}: {item.reason}"))
+        out.print(Text(f"Not understood: {item.what}: {item.reason}"), soft_wrap=True)
     unmarked = [line for line in summary.lines if line.state is not ClassState.GRADED]
     for line in unmarked:
-        out.print(Text(f"{line.state.value.capitalize()}: {line.name}: {line.reason}"))
-    out.print(Text(f"{len(summary.lines) - len(unmarked)} of {len(summary.lines)} submissions have a mark."))
-    out.print(Text(f"Overview: {arguments.out / 'index.html'}"))
+        out.print(Text(f"{line.state.value.capitalize()}: {line.name}: {line.reason}"), soft_wrap=True)
+    out.print(
+        Text(f"{len(summary.lines) - len(unmarked)} of {len(summary.lines)} submissions have a mark."), soft_wrap=True
+    )
+    out.print(Text(f"Overview: {arguments.out / 'index.html'}"), soft_wrap=True)
     return NOT_GRADED if any(line.state is ClassState.WITHHELD for line in summary.lines) else GRADED
 
 
@@ -246,7 +248,8 @@ def _fill(arguments: argparse.Namespace) -> int:
         arguments.results, arguments.download, arguments.out, column=arguments.column, feedback=arguments.feedback
     )
     out.print(
-        Text(f"{filled.cells} marks written to {arguments.out}, out of {filled.total} each, column “{filled.column}”.")
+        Text(f"{filled.cells} marks written to {arguments.out}, out of {filled.total} each, column “{filled.column}”."),
+        soft_wrap=True,
     )
     for heading, names in (
         ("Without a mark, so left as they were", filled.without_mark),
@@ -254,7 +257,7 @@ def _fill(arguments: argparse.Namespace) -> int:
         ("Graded, but not in the gradebook", filled.only_in_results),
     ):
         if names:
-            out.print(Text(f"{heading}: {', '.join(names)}"))
+            out.print(Text(f"{heading}: {', '.join(names)}"), soft_wrap=True)
     return GRADED
 
 
@@ -300,7 +303,7 @@ def _rescore(arguments: argparse.Namespace) -> int:
         out.print(table)
     for name, reason in done.failed:
         err.print(Text(f"{name}: {reason}"))
-    out.print(Text(f"{done.count} judged again; {len(done.changes)} changed."))
+    out.print(Text(f"{done.count} judged again; {len(done.changes)} changed."), soft_wrap=True)
     return USAGE if done.failed else GRADED
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import msgspec
 
-from lab2_grader import __version__, checks, evidence, messages, process, report, sandbox, submission
+from lab2_grader import __version__, checks, evidence, messages, process, report, ros, sandbox, submission
 from lab2_grader.build import build
 from lab2_grader.errors import FaultError, UsageError
 from lab2_grader.lab import Rubric
@@ -112,6 +112,7 @@ def grade_taken(
     Raises:
         OSError: The folder for the result cannot be written.
     """
+    ros.byte_compile()
     record = _Recorder(folder, means, taken.facts, time.monotonic() if began is None else began, publish)
     try:
         (scratch / "build").mkdir()

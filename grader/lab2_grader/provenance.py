@@ -72,7 +72,9 @@ def compare(result: Result, folder: Path, again: Result, submission: str = "") -
         submission: Digest of the submission, when it is at hand.
     """
     return (
-        _digest("submission", result.digests.submission, again.digests.submission, "the evidence is of another submission"),
+        _digest(
+            "submission", result.digests.submission, again.digests.submission, "the evidence is of another submission"
+        ),
         *(
             [_digest("hand-in", result.digests.submission, submission, "this is not the submission that was graded")]
             if submission

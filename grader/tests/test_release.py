@@ -43,7 +43,9 @@ def test_two_releases_are_the_same_bytes(students: Path, tmp_path: Path) -> None
 
 
 def test_the_checksums_hold(students: Path) -> None:
-    done = subprocess.run(["sha256sum", "--check", "--strict", "SHA256SUMS-students"], cwd=students, capture_output=True)
+    done = subprocess.run(
+        ["sha256sum", "--check", "--strict", "SHA256SUMS-students"], cwd=students, capture_output=True
+    )
     assert done.returncode == 0, done.stdout.decode()
 
 

@@ -68,6 +68,8 @@ def complaints(animal: Animal | Repository, checks: Iterable[CheckResult | Verdi
                 found.append(f"{seen} without '{fragment}'")
             if not (check.expected and check.observed and check.hint):
                 found.append(f"{seen} without words")
-        elif check.status is Status.BLOCKED and isinstance(animal, Animal) and animal.blocked[name] not in check.because:
+        elif (
+            check.status is Status.BLOCKED and isinstance(animal, Animal) and animal.blocked[name] not in check.because
+        ):
             found.append(f"{seen} instead of because of {animal.blocked[name]}")
     return found
