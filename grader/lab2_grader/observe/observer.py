@@ -66,6 +66,7 @@ class Observer:
     def __init__(self, recorder: Recorder) -> None:
         self.recorder = recorder
         self.messages: list[Message] = []
+        self._by_topic: dict[str, list[Message]] = {}
         self.lines: list[Line] = []
         self.endpoints: dict[str, Endpoint] = {}
         self._changed_at = 0.0
@@ -332,6 +333,7 @@ class Observer:
             row = self._heard.get()
             if self._keeps(row.topic, "dropped_messages", lab.limits().resources.messages):
                 self.messages.append(row)
+                self._by_topic.setdefault(topic, []).append(row)
                 self.recorder.write(row)
 
     def publisher(self, topic: str, type_name: str) -> Publisher[Any]:
@@ -339,6 +341,10 @@ class Observer:
         message_type = message_class(type_name)
         assert message_type is not None, type_name
         return self.node.create_publisher(message_type, topic, 10)
+
+    def messages_on(self, topic: str) -> list[Message]:
+        """The messages that came on *topic*."""
+        return self._by_topic.get(topic, [])
 
     # --- waiting ----------------------------------------------------------------------------
 
