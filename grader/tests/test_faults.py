@@ -110,7 +110,14 @@ def test_no_space_for_the_results(size: int, means: pipeline.Means, tmp_path: Pa
     small = tmp_path / "small"
     small.mkdir()
     kept = tmp_path / "kept"
-    keep = ("sh", "-c", 'out=$1; kept=$2; shift 2; "$@"; code=$?; cp -R "$out" "$kept"; exit $code', "keep", str(small), str(kept))
+    keep = (
+        "sh",
+        "-c",
+        'out=$1; kept=$2; shift 2; "$@"; code=$?; cp -R "$out" "$kept"; exit $code',
+        "keep",
+        str(small),
+        str(kept),
+    )
     around = ("bwrap", "--dev-bind", "/", "/", "--size", str(size), "--tmpfs", str(small), "--", *keep)
     run = _grade(small / "out", *around)
     assert run.returncode == 3, run.stderr

@@ -74,7 +74,13 @@ class Bait:
 
     def values(self, means: pipeline.Means) -> dict[str, str]:
         """What stands in the place of `@NAME@` in the animals."""
-        visible = [sys.prefix, sys.base_prefix, os.path.realpath(sys.base_prefix), *means.ros.reads(), *means.ros.prefixes]
+        visible = [
+            sys.prefix,
+            sys.base_prefix,
+            os.path.realpath(sys.base_prefix),
+            *means.ros.reads(),
+            *means.ros.prefixes,
+        ]
         return {
             "SECRET": SECRET,
             "FILE": str(self.file),
@@ -192,7 +198,9 @@ def _complaints(animal: hostile_builder.Animal, result: Result) -> list[str]:
             found.append(f"{seen} instead of {expected[check.id]}")
         elif check.status is Status.FAIL and check.message != animal.fails[check.id]:
             found.append(f"{seen} instead of {animal.fails[check.id]}")
-        elif check.status is Status.BLOCKED and (animal.blocked.get(check.id) or animal.blocks_all) not in check.because:
+        elif (
+            check.status is Status.BLOCKED and (animal.blocked.get(check.id) or animal.blocks_all) not in check.because
+        ):
             found.append(f"{seen} because of something else")
     return found
 

@@ -76,7 +76,12 @@ def _traceback(found: Evidence, text: str) -> Evidence:
     def died(scene: Scene) -> Scene:
         last = scene.events[-1].at
         told = [
-            Line(last, "launch", "stderr", "[ERROR] [launch]: Caught exception in launch (see debug for traceback): " + clean(text, 3000)),
+            Line(
+                last,
+                "launch",
+                "stderr",
+                "[ERROR] [launch]: Caught exception in launch (see debug for traceback): " + clean(text, 3000),
+            ),
         ]
         kept = [event for event in scene.events if type(event).__name__ not in ("ProcessSeen", "Line")]
         return replace(scene, events=(*kept, *told))
@@ -106,7 +111,9 @@ def _unsupported(found: Evidence, text: str) -> Evidence:
 
 
 def _faults(found: Evidence, text: str) -> Evidence:
-    return _scene(replace(found, faults=(clean(text, 300),)), SceneName.LISTENER, lambda s: replace(s, fault=clean(text, 300)))
+    return _scene(
+        replace(found, faults=(clean(text, 300),)), SceneName.LISTENER, lambda s: replace(s, fault=clean(text, 300))
+    )
 
 
 def _git(found: Evidence, text: str) -> Evidence:

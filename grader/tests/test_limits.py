@@ -103,7 +103,9 @@ def test_the_size_of_a_file(isolation: sandbox.Isolation) -> None:
     write = "open('/tmp/file', 'wb').write(bytes({size}))"
     limits = Limits(seconds=20, file_bytes=5 * MB)
     assert _run(isolation, write.format(size=5 * MB), limits).code == 0
-    above = _run(isolation, f"import os\n{write.format(size=5 * MB + 1)}\nassert os.stat('/tmp/file').st_size > {5 * MB}", limits)
+    above = _run(
+        isolation, f"import os\n{write.format(size=5 * MB + 1)}\nassert os.stat('/tmp/file').st_size > {5 * MB}", limits
+    )
     assert above.code != 0
 
 
@@ -120,7 +122,11 @@ def test_the_disk(where: str, isolation: sandbox.Isolation) -> None:
 @pytest.mark.parametrize("where", ["/", "/dev", "/usr", "/home", "/proc", "/etc"])
 def test_nothing_else_can_be_written_to(where: str, isolation: sandbox.Isolation) -> None:
     outcome = _run(isolation, f"open('{where}/file', 'w')", Limits(seconds=20))
-    assert b"Read-only file system" in outcome.stderr or b"Permission denied" in outcome.stderr or b"No such file" in outcome.stderr
+    assert (
+        b"Read-only file system" in outcome.stderr
+        or b"Permission denied" in outcome.stderr
+        or b"No such file" in outcome.stderr
+    )
 
 
 def test_output_that_is_kept(isolation: sandbox.Isolation) -> None:
