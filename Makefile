@@ -113,14 +113,14 @@ test-slow: setup-dev ## run the tests that take long
 
 lint: setup-dev ## check style, types, spelling, links and the lab's facts; changes nothing
 	@$(BIN)/ruff check .
-	@$(BIN)/ruff format --check .
+	@$(BIN)/ruff format --check grader worksheet
 	@cd grader && ../$(BIN)/mypy
 	@cd worksheet && ../$(BIN)/mypy lab2_worksheet
 	@$(WITH) $(BIN)/python -m lab2_worksheet lint
 
 format: setup-dev ## put the code into its form
-	@$(BIN)/ruff check --fix .
-	@$(BIN)/ruff format .
+	@$(BIN)/ruff check --fix grader worksheet
+	@$(BIN)/ruff format grader worksheet
 
 bench: setup-dev ## measure how fast a grade is; writes build/bench.json
 	@PYTHONPATH=grader $(BIN)/python grader/tests/bench.py build/bench.json

@@ -20,7 +20,20 @@ from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
 
-from lab2_grader import __version__, bag, doctor, evidence, lab, pipeline, process, report, ros, sandbox
+from lab2_grader import (
+    __version__,
+    bag,
+    doctor,
+    evidence,
+    lab,
+    pipeline,
+    process,
+    provenance,
+    report,
+    ros,
+    sandbox,
+    submission,
+)
 from lab2_grader.checks import verdicts
 from lab2_grader.classroom import gradebook, remark, run
 from lab2_grader.classroom.progress import Progress
@@ -57,7 +70,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         return NOT_GRADED
     except Exception:
-        Path(LOG).write_text(f"lab2-grader {__version__}, Python {sys.version}\n\n{traceback.format_exc()}")
+        told = f"lab2-grader {__version__}, Python {sys.version}\n\n{traceback.format_exc()}"
+        try:
+            Path(LOG).write_text(told)
+        except OSError:
+            err.print(Text(told))
         err.print(f"The grader itself failed; no mark was given. Send the file {LOG} to whoever maintains it.")
         return NOT_GRADED
 
@@ -138,6 +155,12 @@ def _parser() -> argparse.ArgumentParser:
 
     examine = commands.add_parser("doctor", help="look at this machine and say what would get in the way")
     examine.set_defaults(run=_doctor)
+
+    verify = commands.add_parser("verify", help="whether a result still is what was graded, and who signed it")
+    verify.add_argument("result", type=Path, help="a result's folder, or the result.json in it")
+    verify.add_argument("--submission", help="compare with this submission, too")
+    verify.add_argument("--rubric", type=Path, help="the rubric it was marked by, when not the lab's own")
+    verify.set_defaults(run=_verify)
 
     explain = commands.add_parser("explain", help="what a check asks and how it is judged")
     explain.add_argument("check", nargs="?", help="the id of a check; without one, all are listed")
@@ -319,6 +342,20 @@ def _deadline(text: str) -> datetime:
     except ValueError:
         raise argparse.ArgumentTypeError("give a time like 2026-10-23T17:00 or 2026-10-23T17:00+01:00") from None
     return found if found.tzinfo else found.astimezone()
+
+
+def _verify(arguments: argparse.Namespace) -> int:
+    folder = arguments.result.parent if arguments.result.name == report.RESULT else arguments.result
+    result, _ = pipeline.read(folder)
+    again = pipeline.rescore(folder, lab.rubric(arguments.rubric))
+    handed_in = ""
+    if arguments.submission:
+        with process.temporary_directory() as scratch:
+            handed_in = submission.take(arguments.submission, scratch / "package").facts.sha256
+    findings = provenance.compare(result, folder / pipeline.EVIDENCE, again, handed_in)
+    for finding in findings:
+        out.print(Text(f"{finding.what:10} {finding.holds.value:14} {finding.text}"), soft_wrap=True)
+    return BELOW if any(finding.holds is provenance.Verified.NO for finding in findings) else GRADED
 
 
 def _explain(arguments: argparse.Namespace) -> int:

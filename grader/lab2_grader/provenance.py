@@ -11,8 +11,7 @@ from pathlib import Path
 import msgspec
 
 from lab2_grader import evidence
-from lab2_grader.errors import UsageError
-from lab2_grader.records import RESULT_SCHEMA, Record, Result
+from lab2_grader.records import Record, Result
 
 KEY = "LAB2_GRADER_KEY"  # the environment variable with the key; whoever has it can sign, so submissions never see it
 
@@ -43,23 +42,6 @@ def _signature(result: Result, key: str) -> str:
     """Over the whole result but its signature, as JSON with the fields in the order of `Result`."""
     unsigned = msgspec.json.encode(msgspec.structs.replace(result, signature=""))
     return hmac.new(key.encode(), unsigned, hashlib.sha256).hexdigest()
-
-
-def read(path: Path) -> Result:
-    """The result at *path*.
-
-    Raises:
-        UsageError: It is not there, or is no result of this version.
-    """
-    try:
-        result = msgspec.json.decode(path.read_bytes(), type=Result)
-    except OSError as error:
-        raise UsageError(f"There is no result at {path} ({error.strerror}).") from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path} is no result of this grader, or was changed: {error}.") from error
-    if result.schema != RESULT_SCHEMA:
-        raise UsageError(f"{path} is of version {result.schema}; this grader reads {RESULT_SCHEMA}.")
-    return result
 
 
 def compare(result: Result, folder: Path, again: Result, submission: str = "") -> tuple[Finding, ...]:

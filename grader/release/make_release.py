@@ -19,11 +19,12 @@ from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
 
+from lab2_worksheet.build import build as build_worksheet
+from lab2_worksheet.release import in_words, solutions_released
+
 from lab2_grader import __version__, lab, process
 from lab2_grader.errors import FaultError, Lab2Error, UsageError
 from lab2_grader.records import Limits, Request
-from lab2_worksheet.build import build as build_worksheet
-from lab2_worksheet.release import in_words, solutions_released
 
 ROOT = Path(__file__).resolve().parents[2]
 LEFT_OUT = ("__pycache__", "build", "install", "log", "results")

@@ -39,7 +39,7 @@ def shown_harmlessly(name: str, data: bytes) -> None:
 
 
 def _no_controls(name: str, text: str) -> None:
-    for index, character in enumerate(text):
+    for index, character in enumerate(text) if not text.replace("\n", "").isprintable() else ():
         if character in "\n" + JOINERS:
             continue
         category = unicodedata.category(character)

@@ -57,7 +57,7 @@ def test_an_untouched_result_matches(folder: Path, verify: Callable[..., tuple[i
 
 
 def test_digests_are_of_what_was_graded(folder: Path) -> None:
-    result = provenance.read(folder / "result.json")
+    result = pipeline.read(folder)[0]
     assert result.digests.submission == result.submission.sha256
     assert len(result.digests.evidence) == len(result.digests.rubric) == 64
 
@@ -103,7 +103,7 @@ def test_a_signature_is_checked(
     folder: Path, verify: Callable[..., tuple[int, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _sign(folder, KEY, monkeypatch)
-    assert len(provenance.read(folder / "result.json").signature) == 64
+    assert len(pipeline.read(folder)[0].signature) == 64
     assert verify(str(folder), key=KEY)[0] == 0
     code, said = verify(str(folder), key="another")
     assert code == 1
@@ -115,7 +115,7 @@ def test_a_signed_result_that_was_changed_is_found_out(
 ) -> None:
     """Whoever changes evidence, digests and mark so that they fit each other still lacks the key."""
     _sign(folder, KEY, monkeypatch)
-    result = provenance.read(folder / "result.json")
+    result = pipeline.read(folder)[0]
     renamed = msgspec.structs.replace(result.submission, name="somebody-else")
     forged = msgspec.structs.replace(result, submission=renamed)
     (folder / "result.json").write_bytes(msgspec.json.encode(forged))

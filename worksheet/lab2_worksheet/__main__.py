@@ -9,8 +9,7 @@ from pathlib import Path
 
 from lab2_grader.errors import UsageError
 
-from lab2_worksheet import play, recording
-from lab2_worksheet import handout
+from lab2_worksheet import handout, play, recording
 from lab2_worksheet.build import build
 from lab2_worksheet.errors import SourceError
 from lab2_worksheet.places import OUTPUT

@@ -53,7 +53,9 @@ def write(repository: Path = REPOSITORY) -> tuple[Path, ...]:
         text = path.read_text(encoding="utf-8")
         found = list(re.finditer(fact.pattern, text))
         if len(found) != 1:
-            raise SourceError(f"{fact.path}: {fact.pattern!r} stands there {len(found)} times; it must stand there once.")
+            raise SourceError(
+                f"{fact.path}: {fact.pattern!r} stands there {len(found)} times; it must stand there once."
+            )
         begin, end = found[0].span(1)
         if text[begin:end] != fact.value:
             path.write_text(text[:begin] + fact.value + text[end:], encoding="utf-8")

@@ -16,6 +16,7 @@ def notes(evidence: Evidence) -> tuple[str, ...]:
     view = View(evidence)
     return (
         *evidence.faults,
+        *([messages.note("isolation-off")] if evidence.runtime.isolation == "off" else []),
         *_period(view),
         *_print(view),
         *_names(view),

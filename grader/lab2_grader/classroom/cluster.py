@@ -14,7 +14,8 @@ from lab2_grader.classroom.pool import StoppedError
 from lab2_grader.classroom.records import Graded
 from lab2_grader.classroom.work import Doing, Version
 from lab2_grader.errors import FaultError, UsageError
-from lab2_grader.lab import Rubric, rubric as own_rubric
+from lab2_grader.lab import Rubric
+from lab2_grader.lab import rubric as own_rubric
 from lab2_grader.score import rubric_digest
 
 CONNECT_SECONDS = 15

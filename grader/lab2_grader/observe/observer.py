@@ -333,7 +333,7 @@ class Observer:
             row = self._heard.get()
             if self._keeps(row.topic, "dropped_messages", lab.limits().resources.messages):
                 self.messages.append(row)
-                self._by_topic.setdefault(topic, []).append(row)
+                self._by_topic.setdefault(row.topic, []).append(row)
                 self.recorder.write(row)
 
     def publisher(self, topic: str, type_name: str) -> Publisher[Any]:
