@@ -22,7 +22,7 @@ import subprocess
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from lab2_grader import cgroup, lab
@@ -165,10 +165,39 @@ def _descendants(root: int) -> dict[int, _Stat]:
     return tree
 
 
+@functools.cache
+def _can_walk() -> bool:
+    """Whether the kernel lists the children of a thread (`CONFIG_PROC_CHILDREN`)."""
+    return Path(f"/proc/self/task/{threading.get_native_id()}/children").exists()
+
+
+def _walk(root: int) -> dict[int, _Stat]:
+    """As `_descendants`, from child to child: quicker, but a child may be passed over while a sibling of it ends."""
+    if not _can_walk():
+        return _descendants(root)
+    tree: dict[int, _Stat] = {}
+    pending = [root]
+    while pending:
+        pid = pending.pop()
+        if pid in tree or (found := _stat(pid)) is None:
+            continue
+        tree[pid] = found
+        with contextlib.suppress(OSError):
+            for thread in os.listdir(f"/proc/{pid}/task"):  # noqa: PTH208
+                with open(f"/proc/{pid}/task/{thread}/children", "rb") as children:  # noqa: PTH123
+                    pending += map(int, children.read().split())
+    return tree
+
+
+def alive(pid: int) -> bool:
+    """Whether *pid* is a living process."""
+    return _stat(pid) is not None
+
+
 def tree(root: int) -> tuple[ProcessInfo, ...]:
     """The living processes below and including *root*, by pid, each with its arguments."""
     found = []
-    for pid, stat in sorted(_descendants(root).items()):
+    for pid, stat in sorted(_walk(root).items()):
         try:
             raw = Path(f"/proc/{pid}/cmdline").read_bytes()
             status = Path(f"/proc/{pid}/status").read_bytes()
@@ -181,9 +210,9 @@ def tree(root: int) -> tuple[ProcessInfo, ...]:
     return tuple(found)
 
 
-def busy(root: int) -> bool:
-    """Whether a thread of *root* or of its descendants runs, or waits for a processor or a disk."""
-    for pid in _descendants(root):
+def busy(pids: Iterable[int]) -> bool:
+    """Whether a thread of one of the processes *pids* runs, or waits for a processor or a disk."""
+    for pid in pids:
         with contextlib.suppress(OSError):
             for thread in Path(f"/proc/{pid}/task").iterdir():
                 text = (thread / "stat").read_bytes()
@@ -434,7 +463,7 @@ class Process:
         if self._group is not None:
             struck = self._group.struck()
             return struck or ("cpu" if limits.cpu_seconds and self._group.cpu_seconds() > limits.cpu_seconds else "")
-        found = _descendants(self.pid).values()
+        found = _walk(self.pid).values()
         if limits.processes and sum(stat.threads for stat in found) > limits.processes:
             return "processes"
         if limits.memory_bytes and sum(stat.resident for stat in found) > limits.memory_bytes:

@@ -149,18 +149,18 @@ class Observer:
             return
         found = {info.pid: info for info in process.tree(self._program.pid)} if self._program.running else {}
         self._table = found
-        if found and process.busy(self._program.pid):
+        if process.busy(found):
             self._changed_at = self.recorder.now()
         marker = f"/lib/{lab.specification().package}/"
         for pid, info in found.items():
-            if pid not in self._processes:
+            if not self._processes.get(pid):  # one that was seen before its exec has the name of its parent yet
                 script = next((part for part in info.command[:2] if marker in part), "")
                 executable = PurePosixPath(script).name if script else ""
                 self._processes[pid] = executable
                 if executable:
                     command = clean(" ".join(info.command), 500)
                     self.recorder.write(ProcessSeen(self.recorder.now(), pid, clean(executable, 100), command))
-        for pid in [pid for pid in self._processes if pid not in found]:
+        for pid in [pid for pid in self._processes if pid not in found and not process.alive(pid)]:
             if executable := self._processes.pop(pid):
                 self.ended_executables |= {executable}
                 by = EndedBy.GRADER if self._stopping else EndedBy.ITSELF
