@@ -183,7 +183,7 @@ def _walk(root: int) -> dict[int, _Stat]:
             continue
         tree[pid] = found
         with contextlib.suppress(OSError):
-            for thread in os.listdir(f"/proc/{pid}/task"):  # noqa: PTH208
+            for thread in os.listdir(f"/proc/{pid}/task"):
                 with open(f"/proc/{pid}/task/{thread}/children", "rb") as children:  # noqa: PTH123
                     pending += map(int, children.read().split())
     return tree

@@ -51,13 +51,28 @@ def write(repository: Path = REPOSITORY) -> tuple[Path, ...]:
     for fact in facts():
         path = repository / fact.path
         text = path.read_text(encoding="utf-8")
-        found = list(re.finditer(fact.pattern, text))
-        if len(found) != 1:
-            raise SourceError(
-                f"{fact.path}: {fact.pattern!r} stands there {len(found)} times; it must stand there once."
-            )
-        begin, end = found[0].span(1)
+        begin, end = _place(fact, text)
         if text[begin:end] != fact.value:
             path.write_text(text[:begin] + fact.value + text[end:], encoding="utf-8")
             changed.append(path)
     return tuple(changed)
+
+
+def check(repository: Path = REPOSITORY) -> None:
+    """Hold that every place says what the facts say: a page would contradict its own listings.
+
+    Raises:
+        SourceError: A place says something else, is missing, or there are several.
+    """
+    for fact in facts():
+        text = (repository / fact.path).read_text(encoding="utf-8")
+        begin, end = _place(fact, text)
+        if text[begin:end] != fact.value:
+            raise SourceError(f"{fact.path} says {text[begin:end]}, the facts say {fact.value}. Run `make worksheet`.")
+
+
+def _place(fact: Fact, text: str) -> tuple[int, int]:
+    found = list(re.finditer(fact.pattern, text))
+    if len(found) != 1:
+        raise SourceError(f"{fact.path}: {fact.pattern!r} stands there {len(found)} times; it must stand there once.")
+    return found[0].span(1)

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from jinja2.exceptions import TemplateError
-from lab2_grader import lab
 from lab2_grader.report.pictures import PICTURE_CSS
 from markupsafe import Markup
 
-from lab2_worksheet import listings, markdown
+from lab2_worksheet import handout, markdown
 from lab2_worksheet.blocks import HtmlBlocks, MarkdownBlocks
 from lab2_worksheet.errors import SourceError
 from lab2_worksheet.manifest import commands, facts, questions, tasks
@@ -38,7 +37,7 @@ def editions() -> Editions:
     Raises:
         SourceError: A source is wrong; the text says which and how.
     """
-    _facts_fit()
+    handout.check()
     student = _body(staff=False)
     return Editions(
         student=_page(student, "student"),
@@ -98,18 +97,6 @@ def _all_used(used: frozenset[str]) -> None:
     shown |= {f"command:{key}" for key in commands()}
     if missing := sorted(shown - used):
         raise SourceError(f"In the data, but nowhere in the page: {', '.join(missing)}.")
-
-
-def _facts_fit() -> None:
-    """Raise when the packages say something else than the lab's facts: the page would contradict its own listings."""
-    spec = lab.specification()
-    said = (
-        (listings.template(f"{spec.package}/talker.py"), f"period_in_seconds = {spec.text_topic.period_seconds:g}"),
-        (listings.solution(f"{spec.package}/numeric_talker.py"), f"LARGEST_NUMBER = {spec.number_topic.largest}"),
-    )
-    for listing, line in said:
-        if line not in (row.strip() for row in listing.text.splitlines()):
-            raise SourceError(f"specification.toml and {listing.path} differ: the file has no line `{line}`.")
 
 
 def _page(body: Markup, edition: str) -> str:

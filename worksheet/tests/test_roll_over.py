@@ -58,7 +58,6 @@ def test_the_worksheet_follows_the_facts(copy: Path) -> None:
         (r"^worksheet_url = .*", 'worksheet_url = "https://example.org/lab2.html"'),
     )
     edit(facts / "specification.toml", (r"^largest = .*", "largest = 99"))
-    edit(copy / "solution" / "lab2" / "numeric_talker.py", (r"LARGEST_NUMBER = \d+", "LARGEST_NUMBER = 99"))
     edit(facts / "rubric.toml", (r'(id = "talker-wrap"(?:\n.+)*\npoints = )\d+', r"\g<1>77"))
     done = build(copy)
     assert done.returncode == 0, done.stderr
@@ -68,14 +67,36 @@ def test_the_worksheet_follows_the_facts(copy: Path) -> None:
         assert fact in student
     assert "git clone git@example.org:robo/lab2 lab2" in student and "git@example.org:robo/lab2" in readme
     assert "up to 99 (or 98)" in student
+    assert "LARGEST_NUMBER = 99\n" in (copy / "solution/lab2/numeric_talker.py").read_text()
+    workflow = (copy / "lab2_template/.github/workflows/feedback.yml").read_text()
+    assert "GRADER: git+https://example.org/grader\n" in workflow
     assert "<https://example.org/lab2.html>" in readme and "lab2.html#section-6-7-1" in readme
     for old in ("COMP3631", "Xiao Wang", "week 3"):
         assert old not in student and old not in readme
 
 
-def test_a_period_that_the_listing_contradicts_is_refused(copy: Path) -> None:
+def test_the_packages_follow_the_period(copy: Path) -> None:
     specification = copy / "grader" / "lab2_grader" / "facts" / "specification.toml"
     edit(specification, (r"^period_seconds = .*", "period_seconds = 2.0"))
     done = build(copy)
+    assert done.returncode == 0, done.stderr
+    for package in ("lab2_template", "solution"):
+        assert "period_in_seconds = 2.0\n" in (copy / package / "lab2/talker.py").read_text()
+
+
+@pytest.mark.parametrize(
+    ("file", "pattern", "replacement", "said"),
+    [
+        ("specification", r"^largest = .*", "largest = 300", "largest"),
+        ("specification", r"^period_seconds = .*", "period_seconds = 0.0", "period"),
+        ("specification", r'^type = "std_msgs/msg/Int8"', 'type = "std_msgs/msg/Int32"', "Int8"),
+        ("course", r"^week = .*", "week = 77", "week"),
+        ("course", r"^solutions_release = .*", "solutions_release = 2019-01-01", "solutions_release"),
+        ("course", r"^contact_email = .*", 'contact_email = "nobody"', "contact_email"),
+    ],
+)
+def test_what_cannot_follow_is_refused(copy: Path, file: str, pattern: str, replacement: str, said: str) -> None:
+    edit(copy / "grader" / "lab2_grader" / "facts" / f"{file}.toml", (pattern, replacement))
+    done = build(copy)
     assert done.returncode == 2
-    assert "period_in_seconds = 2" in done.stderr and "talker.py" in done.stderr
+    assert said in done.stderr and f"{file}.toml" in done.stderr
