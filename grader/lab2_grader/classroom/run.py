@@ -184,6 +184,7 @@ class _Run:
     def _graded(self, entry: Entry) -> tuple[ClassLine, bool]:
         """(the line of *entry*, whether it had been graded before)."""
         order, doing = self._order, self._doing(entry.name)
+        results.check_free(self._out, entry.name)
         doing("taking it over")
         with process.temporary_directory() as scratch:
             source = inbox.fetch(entry, scratch)
