@@ -25,7 +25,9 @@ from lab2_grader.report.pictures import Mark, first_departure
 
 DATA = Path(__file__).parent / "data"
 NAMES = ("perfect", "middling", "broken")
-HOSTILE = "<img src=x onerror=alert(1)> ::error::forged ##[error]forged | `x` **b** @all [l](http://e.example) \x1b[2J\x00"
+HOSTILE = (
+    "<img src=x onerror=alert(1)> ::error::forged ##[error]forged | `x` **b** @all [l](http://e.example) \x1b[2J\x00"
+)
 
 
 @pytest.fixture(params=NAMES)
@@ -275,7 +277,10 @@ def test_junit_is_read_by_its_readers(report: Report, tmp_path: Path) -> None:
         cases = list(suite)
         keys = [(case.classname, case.name) for case in cases]
         assert len(keys) == len(set(keys)) == len(shown.result.checks)
-        counts = [sum(check.status is status for check in shown.result.checks) for status in (Status.FAIL, Status.INCONCLUSIVE)]
+        counts = [
+            sum(check.status is status for check in shown.result.checks)
+            for status in (Status.FAIL, Status.INCONCLUSIVE)
+        ]
         assert [suite.failures, suite.errors] == counts
         for case, check in zip(cases, shown.result.checks, strict=True):
             kinds = {type(entry).__name__ for entry in case.result}
@@ -336,7 +341,9 @@ def test_gradescope_accepts_its_file(report: Report) -> None:
 
 
 def test_classroom_50_accepts_its_file(report: Report) -> None:
-    data = json.loads(classroom50(report, Assignment("c", "a", "s", "https://commit", "https://release", "https://review")))
+    data = json.loads(
+        classroom50(report, Assignment("c", "a", "s", "https://commit", "https://release", "https://review"))
+    )
     strings = ("schema", "classroom", "assignment", "submission", "commit", "release", "review", "datetime")
     assert all(isinstance(data[key], str) and data[key] for key in strings)
     assert data["schema"] == "classroom50/result/v1"
@@ -350,5 +357,15 @@ def test_classroom_50_accepts_its_file(report: Report) -> None:
 def test_the_result_keeps_its_contract(samples: dict[str, Path]) -> None:
     for name in NAMES:
         data = json.loads((samples[name] / "result.json").read_bytes())
-        assert {"schema", "submission", "graded", "score", "max_score", "checklist", "checks", "notes", "runtime"} <= set(data)
+        assert {
+            "schema",
+            "submission",
+            "graded",
+            "score",
+            "max_score",
+            "checklist",
+            "checks",
+            "notes",
+            "runtime",
+        } <= set(data)
         msgspec.json.decode((samples[name] / "result.json").read_bytes(), type=Result)
