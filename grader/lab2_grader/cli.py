@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 import time
@@ -37,10 +38,11 @@ from lab2_grader import (
 from lab2_grader.checks import verdicts
 from lab2_grader.classroom import gradebook, remark, run
 from lab2_grader.classroom.progress import Progress
-from lab2_grader.errors import Lab2Error, RefusedError, UsageError
+from lab2_grader.errors import FaultError, Lab2Error, RefusedError, UsageError
 from lab2_grader.outlets import GithubJob, Gradescope, Outlet
 from lab2_grader.records import ClassState, Clock, Evidence, Result
 from lab2_grader.report import Audience, github
+from lab2_grader.report.classroom50 import Assignment, classroom50
 from lab2_grader.report.terminal import plain, terminal
 
 GRADED, BELOW, USAGE, NOT_GRADED, INTERRUPTED = 0, 1, 2, 3, 130
@@ -292,14 +294,20 @@ def _report(arguments: argparse.Namespace) -> int:
     if arguments.format is None:
         if arguments.bag is None:
             out.print(terminal(result))
-        return _exit_code(result, None)
-    text = report.FORMATS[arguments.format](report.report_of(result, observed, arguments.audience))
+        return GRADED
+    shown = report.report_of(result, observed, arguments.audience)
+    if arguments.format == "classroom50":
+        if not result.graded:
+            raise FaultError("The mark is withheld, and Classroom 50 has no word for that: nothing was written.")
+        text = classroom50(shown, Assignment.told(os.environ))
+    else:
+        text = report.FORMATS[arguments.format](shown)
     if arguments.output is None:
         sys.stdout.buffer.write(text.encode("utf-8", "replace"))
         sys.stdout.flush()
     else:
         evidence.write_atomically(arguments.output, text.encode("utf-8", "replace"))
-    return _exit_code(result, None)
+    return GRADED
 
 
 def _doctor(_arguments: argparse.Namespace) -> int:
