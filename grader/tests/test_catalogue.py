@@ -71,7 +71,7 @@ def test_nothing_promises_an_exception_that_jazzy_does_not_raise() -> None:
 
 
 @pytest.mark.parametrize(
-    "path", sorted(PACKAGE.glob("checks/*.py")) + [PACKAGE / "score.py", PACKAGE / "near.py"], ids=lambda p: p.stem
+    "path", [*sorted(PACKAGE.glob("checks/*.py")), PACKAGE / "score.py", PACKAGE / "near.py"], ids=lambda p: p.stem
 )
 def test_no_sentence_is_written_elsewhere(path: Path) -> None:
     tree = ast.parse(path.read_text())

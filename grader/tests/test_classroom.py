@@ -73,7 +73,9 @@ def marks(out: Path) -> dict[str, tuple[int | None, dict[str, str]]]:
 def wrong(result: dict[str, str], animal: Animal) -> dict[str, str]:
     """Statuses in *result* that are not those of *animal*, git aside."""
     expected = animal.statuses()
-    return {check: status for check, status in result.items() if not check.startswith("git") and status != expected[check]}
+    return {
+        check: status for check, status in result.items() if not check.startswith("git") and status != expected[check]
+    }
 
 
 @pytest.fixture(scope="module")
@@ -151,7 +153,7 @@ def test_another_rubric_costs_no_run(copied: tuple[Path, Path], tmp_path: Path) 
     box, out = copied
     text = (lab.FACTS / "rubric.toml").read_text()
     changed = tmp_path / "rubric.toml"
-    changed.write_text(re.sub(r'(id = "talker-wrap".*?points = )12', r"\g<1>2", text, flags=re.S))
+    changed.write_text(re.sub(r'(id = "talker-wrap".*?points = )12', r"\g<1>2", text, flags=re.DOTALL))
     assert changed.read_text() != text
     watched = Watched()
     summed = run.grade_class(msgspec.structs.replace(order(box, out), rubric=lab.rubric(changed)), watched)
@@ -208,7 +210,9 @@ def test_without_bubblewrap_nothing_is_graded(small: Path, tmp_path: Path) -> No
         text=True,
     )
     assert done.returncode == 3
-    assert "apt-get install bubblewrap" in done.stderr.replace("\n", " ") and "ISOLATION=off" in done.stderr.replace("\n", " ")
+    assert "apt-get install bubblewrap" in done.stderr.replace("\n", " ") and "ISOLATION=off" in done.stderr.replace(
+        "\n", " "
+    )
     assert not list((tmp_path / "out").glob("*/"))
 
 
@@ -259,7 +263,9 @@ def kill_and_go_on(box: Path, out: Path, times: int, seed: int, longest: float) 
         for folder in out.glob("*/"):
             if folder.name != results.INCOMING:
                 assert msgspec.json.decode((folder / "class.json").read_bytes(), type=Stamp)
-                assert pipeline.rescore(folder, lab.rubric()) == results.result(folder), f"half a result of {folder.name}"
+                assert pipeline.rescore(folder, lab.rubric()) == results.result(folder), (
+                    f"half a result of {folder.name}"
+                )
     finished = {path.parent.name for path in out.glob("*/class.json")}
     process = start(box, out)
     said, errors = process.communicate(timeout=1200)
@@ -330,7 +336,9 @@ def test_the_whole_zoo_side_by_side(tmp_path: Path) -> None:
         animal.build(tmp_path / "inbox" / name)
     summed, _ = graded(tmp_path / "inbox", tmp_path / "results")
     found = marks(tmp_path / "results")
-    wrongly = {name: bad for name, animal in animals().items() if name in found and (bad := wrong(found[name][1], animal))}
+    wrongly = {
+        name: bad for name, animal in animals().items() if name in found and (bad := wrong(found[name][1], animal))
+    }
     assert wrongly == {}
     assert {line.name for line in summed.lines if line.state is not ClassState.GRADED} == set(animals()) - set(found)
 
@@ -359,7 +367,9 @@ def big_summary(count: int, nasty: str = "") -> ClassSummary:
     chance = random.Random(1)
     lines = []
     for number in range(count):
-        lost = tuple(Lost(check, "fail", 5, "overflow", f"{nasty}saw {number}") for check in checks if chance.random() < 0.1)
+        lost = tuple(
+            Lost(check, "fail", 5, "overflow", f"{nasty}saw {number}") for check in checks if chance.random() < 0.1
+        )
         lines.append(
             ClassLine(
                 f"sc21a{number:03d}", f"{nasty}Student {number}", (), ClassState.GRADED, 100 - 5 * len(lost), 100, lost=lost,

@@ -56,7 +56,9 @@ def cluster(folder: Path, workers: int) -> Iterator[tuple[str, list[subprocess.P
     """(address of a scheduler, its workers)."""
     with ExitStack() as stack:
         scheduler = ("dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
-        _, address = stack.enter_context(started(*scheduler, log=folder / "scheduler.log", wanted=r"Scheduler at:\s+(tcp://\S+)"))
+        _, address = stack.enter_context(
+            started(*scheduler, log=folder / "scheduler.log", wanted=r"Scheduler at:\s+(tcp://\S+)")
+        )
         options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--memory-limit", "0", "--host", "127.0.0.1")
         found = []
         for number in range(workers):

@@ -15,14 +15,21 @@ HEADER = '"Last Name","First Name","Username","Student ID","Last Access","Lab 2 
 
 
 def line(name: str, score: int | None, *keys: str, of: int = 100) -> ClassLine:
-    lost = (Lost("talker-wrap", "fail", 12, "overflow", "=cmd()|'after 127 came -128"),) if score not in (None, of) else ()
+    lost = (
+        (Lost("talker-wrap", "fail", 12, "overflow", "=cmd()|'after 127 came -128"),) if score not in (None, of) else ()
+    )
     state = ClassState.GRADED if score is not None else ClassState.WITHHELD
     return ClassLine(name, name, (*keys, name), state, score, of, lost=lost)
 
 
 @pytest.fixture
 def results(tmp_path: Path) -> Path:
-    lines = (line("ada", 92), line("ben", 92, of=92), line("cem", None), line("zoe", 50, "Participant 7", "zoe@x.example"))
+    lines = (
+        line("ada", 92),
+        line("ben", 92, of=92),
+        line("cem", None),
+        line("zoe", 50, "Participant 7", "zoe@x.example"),
+    )
     summary.write(tmp_path / "results", summary.summarise(lines, (), lab.rubric(), ()))
     return tmp_path / "results"
 
@@ -44,7 +51,13 @@ ROWS = (
 
 @pytest.mark.parametrize(
     ("encoding", "bom"),
-    [("utf-8", b""), ("utf-8", b"\xef\xbb\xbf"), ("utf-16-le", b"\xff\xfe"), ("utf-16-be", b"\xfe\xff"), ("cp1252", b"")],
+    [
+        ("utf-8", b""),
+        ("utf-8", b"\xef\xbb\xbf"),
+        ("utf-16-le", b"\xff\xfe"),
+        ("utf-16-be", b"\xfe\xff"),
+        ("cp1252", b""),
+    ],
 )
 @pytest.mark.parametrize("tabs", [False, True])
 def test_minerva_keeps_every_byte_but_the_marks(
@@ -55,7 +68,9 @@ def test_minerva_keeps_every_byte_but_the_marks(
         text = text.replace('","', '"\t"')
     before = bom + text.encode(encoding)
     after, done = filled(tmp_path, results, before)
-    expected = text.replace('"2026-10-20"\t""' if tabs else '"2026-10-20",""', '"2026-10-20"\t"18.4"' if tabs else '"2026-10-20","18.4"')
+    expected = text.replace(
+        '"2026-10-20"\t""' if tabs else '"2026-10-20",""', '"2026-10-20"\t"18.4"' if tabs else '"2026-10-20","18.4"'
+    )
     expected = expected.replace('"3"', '"20"')
     assert after == bom + expected.encode(encoding)
     assert (done.cells, done.total) == (2, "20")
@@ -89,7 +104,11 @@ def test_feedback_is_no_formula_and_never_without_a_mark(tmp_path: Path, results
     rows = after.decode().splitlines()
     assert rows[1].startswith('"zoe","50","","","50 of 100. Lost: talker-wrap (-12): =cmd()')
     assert rows[2] == '"cem","","","","",""'
-    assert gradebook.guarded("=1") == "'=1" and gradebook.guarded(" @x") == "' @x" and gradebook.guarded("-1").startswith("'")
+    assert (
+        gradebook.guarded("=1") == "'=1"
+        and gradebook.guarded(" @x") == "' @x"
+        and gradebook.guarded("-1").startswith("'")
+    )
     with pytest.raises(UsageError, match="feedback"):
         filled(tmp_path, results, b"Username,Lab [Total Pts: 100 Score] |1\nada,\n", feedback=True)
 

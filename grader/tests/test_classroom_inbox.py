@@ -220,7 +220,7 @@ def test_a_table_of_repositories(tmp_path: Path) -> None:
     assert [(entry.student, entry.commit) for entry in found.entries] == [("sc1", ""), ("sc2", "abc1234")]
     assert found.entries[0].before == datetime(2026, 10, 23, 17, tzinfo=timezone(timedelta(hours=1)))
     assert found.entries[0].keys == ("sc1", "Ada")
-    assert ["line 4", "line 5", "line 6"] == [item.what.split(", ")[1].split(":")[0] for item in found.unknown]
+    assert [item.what.split(", ")[1].split(":")[0] for item in found.unknown] == ["line 4", "line 5", "line 6"]
 
 
 def test_a_table_without_a_header() -> None:
@@ -235,7 +235,9 @@ def test_a_table_without_a_header() -> None:
 def test_a_deadline_for_all_spares_folders_and_those_with_their_own(tmp_path: Path) -> None:
     write_package(tmp_path / "in/ada")
     own = "2026-10-01T00:00:00+00:00"
-    (tmp_path / "in/class.csv").write_text(f"student,repo,due\nben,https://h.example/b,\ncem,https://h.example/c,{own}\n")
+    (tmp_path / "in/class.csv").write_text(
+        f"student,repo,due\nben,https://h.example/b,\ncem,https://h.example/c,{own}\n"
+    )
     before = datetime(2026, 10, 23, tzinfo=timezone.utc)
     found = {e.name: e.before for e in inbox.look(tmp_path / "in", tmp_path / "out", before).entries}
     assert found == {"ada": None, "ben": before, "cem": datetime.fromisoformat(own)}

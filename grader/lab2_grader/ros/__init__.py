@@ -102,7 +102,9 @@ class Ros(Record, frozen=True):
 
 @functools.cache
 def byte_compile() -> None:
-    """Byte-compile the grader's own modules where they stand, as pip does: observers and launchers, which are started for
+    """Byte-compile the grader's own modules where they stand, as pip does.
+
+    Observers and launchers, which are started for
     every submission, see them read-only. Does nothing where it may not write.
     """
     compileall.compile_dir(HERE.parent, quiet=2, workers=1)
