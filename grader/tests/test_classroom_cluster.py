@@ -21,7 +21,6 @@ from test_classroom import Watched, graded, marks, order, wrong
 from lab2_grader.classroom import run
 from lab2_grader.classroom.cluster import Cluster
 from lab2_grader.errors import UsageError
-from lab2_grader.lab import rubric
 from lab2_grader.records import ClassState
 
 pytest.importorskip("distributed", reason="the extra `dask` is not installed")
@@ -99,14 +98,14 @@ def test_a_worker_with_another_grader_is_named(tmp_path: Path) -> None:
         one = Cluster(address)
         try:
             with pytest.raises(UsageError, match="no workers"):
-                one.check(rubric(), "auto", isolation=True)
+                one.check("auto", isolation=True)
             options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(tmp_path / "w"))
             worker = ("dask_worker", address, *options)
             registered = r"Registered to:\s+(tcp://\S+)"
             other = started(*worker, log=tmp_path / "other.log", wanted=registered, grader=tmp_path / "other")
             stack.enter_context(other)
             with pytest.raises(UsageError, match="another grader"):
-                one.check(rubric(), "auto", isolation=True)
+                one.check("auto", isolation=True)
         finally:
             one.close()
 

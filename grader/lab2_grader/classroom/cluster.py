@@ -48,6 +48,8 @@ class Cluster:
     def check(self, wanted_ros: str, *, isolation: bool) -> None:
         """Compare every worker with this machine: grader, facts, rubric, ROS, isolation.
 
+        A rubric of one's own travels with each submission, so that only the lab's has to be compared.
+
         Raises:
             UsageError: There are no workers, or one would grade differently; the text names it.
         """

@@ -104,8 +104,8 @@ class Ros(Record, frozen=True):
 def byte_compile() -> None:
     """Byte-compile the grader's own modules where they stand, as pip does.
 
-    Observers and launchers, which are started for
-    every submission, see them read-only. Does nothing where it may not write.
+    Observers and launchers, which are started for every submission, see them read-only and would compile them each time.
+    Does nothing where it may not write.
     """
     compileall.compile_dir(HERE.parent, quiet=2, workers=1)
 
