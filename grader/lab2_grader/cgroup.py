@@ -20,7 +20,7 @@ NEEDED = ("memory", "pids")
 WANTED = (*NEEDED, "cpuacct")
 MOUNTS = Path("/proc/self/mounts")
 OWN = Path("/proc/self/cgroup")
-REMOVE_SECONDS = 2.0
+REMOVE_SECONDS = 15.0  # on an overloaded machine the killed take their time to go
 PREFIX = "lab2-"
 
 # The process puts itself into the group before it becomes the program, so that nothing of it is ever outside.
@@ -62,11 +62,16 @@ def _mounted() -> Iterator[tuple[str, str, str]]:
 
 
 def _own_groups() -> dict[str, str]:
-    """The path of our own group by controller; version 2 under the empty name."""
+    """The path of our own group by controller; version 2 under the empty name.
+
+    Of an observer, which is in a group that the grader made, it is the one that the grader is in: groups stand side by
+    side, so that what a submission uses is not the observer's.
+    """
     groups: dict[str, str] = {}
     for line in OWN.read_text().splitlines():
         _, names, path = line.split(":", 2)
-        groups |= dict.fromkeys(names.split(","), path)
+        above, _, last = path.rpartition("/")
+        groups |= dict.fromkeys(names.split(","), above or "/" if last.startswith(PREFIX) else path)
     return groups
 
 

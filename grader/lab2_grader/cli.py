@@ -21,7 +21,20 @@ from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
 
-from lab2_grader import __version__, bag, doctor, evidence, lab, pipeline, process, report, ros, sandbox
+from lab2_grader import (
+    __version__,
+    bag,
+    doctor,
+    evidence,
+    lab,
+    pipeline,
+    process,
+    provenance,
+    report,
+    ros,
+    sandbox,
+    submission,
+)
 from lab2_grader.checks import verdicts
 from lab2_grader.classroom import gradebook, remark, run
 from lab2_grader.classroom.progress import Progress
@@ -59,7 +72,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         return NOT_GRADED
     except Exception:
-        Path(LOG).write_text(f"lab2-grader {__version__}, Python {sys.version}\n\n{traceback.format_exc()}")
+        told = f"lab2-grader {__version__}, Python {sys.version}\n\n{traceback.format_exc()}"
+        try:
+            Path(LOG).write_text(told)
+        except OSError:
+            err.print(Text(told))
         err.print(f"The grader itself failed; no mark was given. Send the file {LOG} to whoever maintains it.")
         return NOT_GRADED
 
@@ -140,6 +157,12 @@ def _parser() -> argparse.ArgumentParser:
 
     examine = commands.add_parser("doctor", help="look at this machine and say what would get in the way")
     examine.set_defaults(run=_doctor)
+
+    verify = commands.add_parser("verify", help="whether a result still is what was graded, and who signed it")
+    verify.add_argument("result", type=Path, help="a result's folder, or the result.json in it")
+    verify.add_argument("--submission", help="compare with this submission, too")
+    verify.add_argument("--rubric", type=Path, help="the rubric it was marked by, when not the lab's own")
+    verify.set_defaults(run=_verify)
 
     explain = commands.add_parser("explain", help="what a check asks and how it is judged")
     explain.add_argument("check", nargs="?", help="the id of a check; without one, all are listed")
@@ -230,16 +253,18 @@ def _grade_all(arguments: argparse.Namespace) -> int:
             )
         )
     live = err.is_terminal
-    progress = Progress(None if live else lambda line: err.print(Text(line)))
+    progress = Progress(None if live else lambda line: err.print(Text(line), soft_wrap=True))
     with Live(progress, console=err, refresh_per_second=4) if live else nullcontext():
         summary = run.grade_class(order, progress)
     for item in summary.unknown:
-        out.print(Text(f"Not understood: {item.what}: {item.reason}"))
+        out.print(Text(f"Not understood: {item.what}: {item.reason}"), soft_wrap=True)
     unmarked = [line for line in summary.lines if line.state is not ClassState.GRADED]
     for line in unmarked:
-        out.print(Text(f"{line.state.value.capitalize()}: {line.name}: {line.reason}"))
-    out.print(Text(f"{len(summary.lines) - len(unmarked)} of {len(summary.lines)} submissions have a mark."))
-    out.print(Text(f"Overview: {arguments.out / 'index.html'}"))
+        out.print(Text(f"{line.state.value.capitalize()}: {line.name}: {line.reason}"), soft_wrap=True)
+    out.print(
+        Text(f"{len(summary.lines) - len(unmarked)} of {len(summary.lines)} submissions have a mark."), soft_wrap=True
+    )
+    out.print(Text(f"Overview: {arguments.out / 'index.html'}"), soft_wrap=True)
     return NOT_GRADED if any(line.state is ClassState.WITHHELD for line in summary.lines) else GRADED
 
 
@@ -248,7 +273,8 @@ def _fill(arguments: argparse.Namespace) -> int:
         arguments.results, arguments.download, arguments.out, column=arguments.column, feedback=arguments.feedback
     )
     out.print(
-        Text(f"{filled.cells} marks written to {arguments.out}, out of {filled.total} each, column “{filled.column}”.")
+        Text(f"{filled.cells} marks written to {arguments.out}, out of {filled.total} each, column “{filled.column}”."),
+        soft_wrap=True,
     )
     for heading, names in (
         ("Without a mark, so left as they were", filled.without_mark),
@@ -256,7 +282,7 @@ def _fill(arguments: argparse.Namespace) -> int:
         ("Graded, but not in the gradebook", filled.only_in_results),
     ):
         if names:
-            out.print(Text(f"{heading}: {', '.join(names)}"))
+            out.print(Text(f"{heading}: {', '.join(names)}"), soft_wrap=True)
     return GRADED
 
 
@@ -308,7 +334,7 @@ def _rescore(arguments: argparse.Namespace) -> int:
         out.print(table)
     for name, reason in done.failed:
         err.print(Text(f"{name}: {reason}"))
-    out.print(Text(f"{done.count} judged again; {len(done.changes)} changed."))
+    out.print(Text(f"{done.count} judged again; {len(done.changes)} changed."), soft_wrap=True)
     return USAGE if done.failed else GRADED
 
 
@@ -324,6 +350,20 @@ def _deadline(text: str) -> datetime:
     except ValueError:
         raise argparse.ArgumentTypeError("give a time like 2026-10-23T17:00 or 2026-10-23T17:00+01:00") from None
     return found if found.tzinfo else found.astimezone()
+
+
+def _verify(arguments: argparse.Namespace) -> int:
+    folder = arguments.result.parent if arguments.result.name == report.RESULT else arguments.result
+    result, _ = pipeline.read(folder)
+    again = pipeline.rescore(folder, lab.rubric(arguments.rubric))
+    handed_in = ""
+    if arguments.submission:
+        with process.temporary_directory() as scratch:
+            handed_in = submission.take(arguments.submission, scratch / "package").facts.sha256
+    findings = provenance.compare(result, folder / pipeline.EVIDENCE, again, handed_in)
+    for finding in findings:
+        out.print(Text(f"{finding.what:10} {finding.holds.value:14} {finding.text}"), soft_wrap=True)
+    return BELOW if any(finding.holds is provenance.Verified.NO for finding in findings) else GRADED
 
 
 def _explain(arguments: argparse.Namespace) -> int:

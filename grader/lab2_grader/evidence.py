@@ -11,6 +11,8 @@ Every field is documented where it is declared, in `records.py`; `grader/docs/ev
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import hashlib
 import os
 from pathlib import Path
@@ -18,7 +20,7 @@ from typing import TypeVar
 
 import msgspec
 
-from lab2_grader.errors import UsageError
+from lab2_grader.errors import FaultError, Lab2Error, UsageError
 from lab2_grader.records import (
     EVIDENCE_SCHEMA,
     Build,
@@ -72,11 +74,32 @@ _events = msgspec.json.Decoder(tuple[Event, ...])
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Write *data* so that a reader finds either the old file or the whole new one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """Write *data* so that a reader finds either the old file or the whole new one.
+
+    Raises:
+        UsageError: The folder may not be written to.
+        FaultError: The disk is full, or fails.
+    """
     draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
-    draft.write_bytes(data)
-    draft.replace(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft.write_bytes(data)
+        draft.replace(path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            draft.unlink(missing_ok=True)
+        raise cannot_write(path, error) from error
+
+
+def cannot_write(path: Path, error: OSError) -> Lab2Error:
+    """Whose fault it is that *path* could not be written: the caller's who chose the folder, or the machine's."""
+    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR, errno.EEXIST):
+        return UsageError(
+            f"{path} cannot be written ({error.strerror}). Choose another folder for the result with --out."
+        )
+    return FaultError(
+        f"{path} could not be written ({error.strerror}). Make room for it and grade the submission again."
+    )
 
 
 def pretty(record: Record) -> bytes:
@@ -93,10 +116,13 @@ class Writer:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        folder.mkdir(parents=True, exist_ok=True)
-        for old in folder.iterdir():
-            if old.suffix in (".json", ".jsonl", ".draft"):
-                old.unlink()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            for old in folder.iterdir():
+                if old.suffix in (".json", ".jsonl", ".draft"):
+                    old.unlink()
+        except OSError as error:
+            raise cannot_write(folder, error) from error
 
     def submission(self, facts: SubmissionFacts) -> None:
         """Record what was handed in."""

@@ -17,6 +17,11 @@ FACTS = Path(__file__).parent / "facts"
 T = TypeVar("T")
 
 
+def _hold(condition: bool, otherwise: str) -> None:
+    if not condition:
+        raise ValueError(otherwise)
+
+
 class Course(Record, frozen=True):
     """This year's course: the facts that change when the lab is rolled over."""
 
@@ -36,6 +41,19 @@ class Course(Record, frozen=True):
     ros_distro: str
     fail_workflow_on_lost_points: bool
 
+    def __post_init__(self) -> None:
+        """Refuse what nothing could follow."""
+        _hold(1 <= self.week <= 52, f"week = {self.week}: a week is from 1 to 52")
+        _hold("@" in self.contact_email, f"contact_email = {self.contact_email!r}: that is no e-mail address")
+        _hold(
+            self.solutions_release.year in (self.year, self.year + 1),
+            f"solutions_release = {self.solutions_release}: it must be in {self.year} or the year after",
+        )
+        _hold(
+            self.worksheet_url == "" or self.worksheet_url.startswith("https://"),
+            f"worksheet_url = {self.worksheet_url!r}: it must begin with https://, or be empty",
+        )
+
 
 class Pair(Record, frozen=True):
     """A talker, a listener and the launch file that starts both, by name."""
@@ -52,6 +70,10 @@ class TextTopic(Record, frozen=True):
     type: str
     period_seconds: float
 
+    def __post_init__(self) -> None:
+        """Refuse a period that no lesson could use."""
+        _hold(0.01 <= self.period_seconds <= 10, f"period_seconds = {self.period_seconds}: it must be from 0.01 to 10")
+
 
 class NumberTopic(Record, frozen=True):
     """The topic with numbers; the count runs from `smallest` to `largest` and back to `smallest`."""
@@ -60,6 +82,12 @@ class NumberTopic(Record, frozen=True):
     type: str
     smallest: int
     largest: int
+
+    def __post_init__(self) -> None:
+        """Refuse what the messages and the grader's own numbers could not carry."""
+        _hold(self.type == "std_msgs/msg/Int8", f"type = {self.type!r}: the lab and its hints are about Int8")
+        _hold(self.smallest == 0, f"smallest = {self.smallest}: the count begins at 0")
+        _hold(9 <= self.largest <= 127, f"largest = {self.largest}: an Int8 holds no more than 127, and 9 make a count")
 
 
 class Specification(Record, frozen=True):
@@ -91,6 +119,7 @@ class BuildLimits(Record, frozen=True):
     output_bytes: int
     disk_bytes: int
     install_bytes: int
+    files: int
 
 
 class StartLimits(Record, frozen=True):
@@ -143,6 +172,9 @@ class ResourceLimits(Record, frozen=True):
     scratch_bytes: int
     output_bytes: int
     line_bytes: int
+    lines: int
+    messages: int
+    topics: int
 
     def limits(self, seconds: float, output_bytes: int | None = None) -> Limits:
         """These limits for one run of at most *seconds*, keeping *output_bytes* of its output."""

@@ -60,6 +60,7 @@ class Catalogue(Record, frozen=True):
     check: dict[str, CheckTexts]
     status: dict[str, str]
     note: dict[str, str]
+    phrase: dict[str, str]
     refusal: dict[str, Refusal]
     doctor: dict[str, DoctorTexts]
     report: dict[str, str]
@@ -97,6 +98,26 @@ def report(key: str, **values: Value) -> str:
     return fill(catalogue().report[key], **values)
 
 
+def phrase(key: str, **values: Value) -> str:
+    """The piece of a sentence of `[phrase]` under *key*, to be filled into another."""
+    return fill(catalogue().phrase[key], **values)
+
+
 def refusal(rule: str, **values: Value) -> RefusedError:
     """The refusal under *rule*."""
     return RefusedError(rule, fill(catalogue().refusal[rule].text, **values))
+
+
+def limits() -> dict[str, Value]:
+    """The limits of `limits.toml` as the sentences that name one use them; sizes in MB."""
+    resources, build = lab.limits().resources, lab.limits().build
+    return {
+        "processes": resources.processes,
+        "memory": resources.memory_bytes // 1_000_000,
+        "cpu": round(resources.cpu_seconds),
+        "file_size": resources.file_bytes // 1_000_000,
+        "disk": build.disk_bytes // 1_000_000,
+        "scratch": resources.scratch_bytes // 1_000_000,
+        "install": build.install_bytes // 1_000_000,
+        "files": build.files,
+    }

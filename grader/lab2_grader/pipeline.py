@@ -9,7 +9,7 @@ from pathlib import Path
 
 import msgspec
 
-from lab2_grader import __version__, checks, evidence, messages, process, report, sandbox, submission
+from lab2_grader import __version__, checks, evidence, messages, process, provenance, report, ros, sandbox, submission
 from lab2_grader.build import build
 from lab2_grader.errors import FaultError, UsageError
 from lab2_grader.lab import Rubric
@@ -110,8 +110,10 @@ def grade_taken(
         publish: As for `grade`.
 
     Raises:
-        OSError: The folder for the result cannot be written.
+        UsageError: The folder for the result cannot be written to.
+        FaultError: There is no room for the result.
     """
+    ros.byte_compile()
     record = _Recorder(folder, means, taken.facts, time.monotonic() if began is None else began, publish)
     try:
         (scratch / "build").mkdir()
@@ -137,7 +139,7 @@ def rescore(folder: Path, rubric: Rubric) -> Result:
         UsageError: The evidence is not there, damaged, or of another version.
     """
     observed = evidence.read(folder / EVIDENCE)
-    return score(observed, checks.judge(observed), rubric, evidence.digest(folder / EVIDENCE))
+    return provenance.sign(score(observed, checks.judge(observed), rubric, evidence.digest(folder / EVIDENCE)))
 
 
 def read(folder: Path) -> tuple[Result, Evidence]:

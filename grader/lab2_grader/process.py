@@ -22,12 +22,13 @@ import subprocess
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from lab2_grader import cgroup, lab
 from lab2_grader.errors import FaultError
 from lab2_grader.records import EndedBy, Limits, Outcome, Request
+from lab2_grader.text import clean
 
 POLL_SECONDS = 0.1
 CHUNK_BYTES = 65_536
@@ -50,15 +51,13 @@ def _new_run() -> str:
     return f"{os.getpid()}.{secrets.token_hex(4)}"
 
 
-_run_name = os.environ.get(MARK) or _new_run()
+_run = {"name": os.environ.get(MARK) or _new_run()}
+os.register_at_fork(after_in_child=lambda: _run.update(name=_new_run()))
 
 
-def _renew_run() -> None:
-    global _run_name
-    _run_name = _new_run()
-
-
-os.register_at_fork(after_in_child=_renew_run)
+def run_name() -> str:
+    """The name of this run of the grader: the mark of everything it starts begins with it and a dash."""
+    return _run["name"]
 
 
 def become_reaper() -> None:
@@ -75,7 +74,7 @@ def environment(*names: str) -> tuple[tuple[str, str], ...]:
 def control_groups() -> cgroup.Base | None:
     """Where control groups can be made on this machine, tried with a real process; None where they cannot."""
     for found in cgroup.candidates():
-        group = cgroup.Group(found, f"{cgroup.PREFIX}{_run_name}-probe")
+        group = cgroup.Group(found, f"{cgroup.PREFIX}{run_name()}-probe")
         try:
             group.make(Limits(seconds=10, processes=64, memory_bytes=100_000_000))
             tried = subprocess.run(group.wrap(("true",)), capture_output=True, timeout=10, cwd="/", check=False)
@@ -94,33 +93,54 @@ def control_groups_if_known() -> cgroup.Base | None:
 
 
 class ProcessInfo:
-    """A line of the process table: `pid` and `command` (its arguments)."""
+    """A line of the process table: `pid`, `parent` and `command` (its arguments).
 
-    __slots__ = ("command", "pid")
+    `inside_pid` is the number by which it knows itself, in its own pid namespace.
+    """
 
-    def __init__(self, pid: int, command: tuple[str, ...]) -> None:
+    __slots__ = ("command", "inside_pid", "parent", "pid")
+
+    def __init__(self, pid: int, inside_pid: int, parent: int, command: tuple[str, ...]) -> None:
         self.pid = pid
+        self.inside_pid = inside_pid
+        self.parent = parent
         self.command = command
 
 
 class _Stat:
     """What the kernel counts of one process; `cpu_seconds` with that of its children that have ended."""
 
-    __slots__ = ("cpu_seconds", "parent", "resident", "threads")
+    __slots__ = ("_fields", "parent")
 
     def __init__(self, fields: list[bytes]) -> None:
         self.parent = int(fields[1])
-        self.cpu_seconds = sum(map(int, fields[11:15])) / CLOCK_TICKS
-        self.threads = int(fields[17])
-        self.resident = int(fields[21]) * PAGE_BYTES
+        self._fields = fields
+
+    @property
+    def cpu_seconds(self) -> float:
+        return sum(map(int, self._fields[11:15])) / CLOCK_TICKS
+
+    @property
+    def threads(self) -> int:
+        return int(self._fields[17])
+
+    @property
+    def resident(self) -> int:
+        return int(self._fields[21]) * PAGE_BYTES
 
 
 def _stat(pid: int) -> _Stat | None:
     """What is counted of *pid*, or None when it is gone or a zombie."""
-    try:
-        text = Path(f"/proc/{pid}/stat").read_bytes()
+    try:  # every scene and every build asks this of every process ten times a second: no objects around three calls
+        descriptor = os.open(f"/proc/{pid}/stat", os.O_RDONLY | os.O_CLOEXEC)
     except OSError:
         return None
+    try:
+        text = os.read(descriptor, 1_024)
+    except OSError:
+        return None
+    finally:
+        os.close(descriptor)
     fields = text[text.rindex(b")") + 2 :].split()
     if fields[0] in (b"Z", b"X"):
         return None
@@ -130,12 +150,11 @@ def _stat(pid: int) -> _Stat | None:
 def _descendants(root: int) -> dict[int, _Stat]:
     """*root* and all its living descendants, with what `_stat` says of each."""
     table: dict[int, _Stat] = {}
-    for entry in os.scandir("/proc"):
-        if entry.name.isdigit() and (found := _stat(int(entry.name))) is not None:
-            table[int(entry.name)] = found
     children: dict[int, list[int]] = {}
-    for pid, stat in table.items():
-        children.setdefault(stat.parent, []).append(pid)
+    for name in os.listdir("/proc"):
+        if name[0] in "123456789" and (found := _stat(int(name))) is not None:
+            table[int(name)] = found
+            children.setdefault(found.parent, []).append(int(name))
     tree: dict[int, _Stat] = {}
     pending = [root]
     while pending:
@@ -146,22 +165,54 @@ def _descendants(root: int) -> dict[int, _Stat]:
     return tree
 
 
+@functools.cache
+def _can_walk() -> bool:
+    """Whether the kernel lists the children of a thread (`CONFIG_PROC_CHILDREN`)."""
+    return Path(f"/proc/self/task/{threading.get_native_id()}/children").exists()
+
+
+def _walk(root: int) -> dict[int, _Stat]:
+    """As `_descendants`, from child to child: quicker, but a child may be passed over while a sibling of it ends."""
+    if not _can_walk():
+        return _descendants(root)
+    tree: dict[int, _Stat] = {}
+    pending = [root]
+    while pending:
+        pid = pending.pop()
+        if pid in tree or (found := _stat(pid)) is None:
+            continue
+        tree[pid] = found
+        with contextlib.suppress(OSError):
+            for thread in os.listdir(f"/proc/{pid}/task"):
+                with open(f"/proc/{pid}/task/{thread}/children", "rb") as children:  # noqa: PTH123
+                    pending += map(int, children.read().split())
+    return tree
+
+
+def alive(pid: int) -> bool:
+    """Whether *pid* is a living process."""
+    return _stat(pid) is not None
+
+
 def tree(root: int) -> tuple[ProcessInfo, ...]:
     """The living processes below and including *root*, by pid, each with its arguments."""
     found = []
-    for pid in sorted(_descendants(root)):
+    for pid, stat in sorted(_walk(root).items()):
         try:
             raw = Path(f"/proc/{pid}/cmdline").read_bytes()
+            status = Path(f"/proc/{pid}/status").read_bytes()
         except OSError:
             continue
         command = tuple(part.decode(errors="replace") for part in raw.rstrip(b"\0").split(b"\0"))
-        found.append(ProcessInfo(pid, command))
+        numbers = next((line for line in status.splitlines() if line.startswith(b"NSpid:")), b"").split()
+        inside = int(numbers[-1]) if len(numbers) > 1 else pid
+        found.append(ProcessInfo(pid, inside, stat.parent, command))
     return tuple(found)
 
 
-def busy(root: int) -> bool:
-    """Whether a thread of *root* or of its descendants runs, or waits for a processor or a disk."""
-    for pid in _descendants(root):
+def busy(pids: Iterable[int]) -> bool:
+    """Whether a thread of one of the processes *pids* runs, or waits for a processor or a disk."""
+    for pid in pids:
         with contextlib.suppress(OSError):
             for thread in Path(f"/proc/{pid}/task").iterdir():
                 text = (thread / "stat").read_bytes()
@@ -199,8 +250,10 @@ class Process:
         self._asked_to_stop: EndedBy | None = None
         self._asked_to_kill = False
         self._began = time.monotonic()
-        self._failure: BaseException | None = None
-        self._name = f"{_run_name}-{next(_counter)}"
+        self._failure: Exception | None = None
+        self._announcement = request.announces.encode() + b"\n" if request.announces else b""
+        self._before = b""  # what came on standard error before the announcement
+        self._name = f"{run_name()}-{next(_counter)}"
         argv = request.argv
         if self._limits.file_bytes:
             argv = ("prlimit", f"--fsize={self._limits.file_bytes}", "--core=0", "--", *argv)
@@ -272,9 +325,11 @@ class Process:
         """Wait for its end; bounded by its deadline and the ladder.
 
         Raises:
-            FaultError: What was to take its output could not; the process was killed for it.
+            FaultError: Its walls could not be put up; or what was to take its output could not, and it was killed.
         """
         self._finished.wait()
+        if isinstance(self._failure, FaultError):
+            raise self._failure
         if self._failure is not None:
             raise FaultError(f"What {self._shown} printed could not be kept: {self._failure}.") from self._failure
         assert self._outcome is not None
@@ -353,6 +408,10 @@ class Process:
                         selector.unregister(key.fileobj)
                         open_streams -= 1
             os.close(pidfd)
+        if self._announcement and self._ended_by is EndedBy.ITSELF:
+            lines = self._before.decode(errors="replace").strip().splitlines()
+            said = lines[-1] if lines else f"exit code {self._popen.returncode}"
+            raise FaultError(f"The sandbox did not start: {clean(said, 300)}.")
         code = self._popen.returncode
         self._outcome = Outcome(
             code=code if code >= 0 else None,
@@ -373,6 +432,8 @@ class Process:
             return True
         if not data:
             return False
+        if self._announcement and name == "stderr":
+            data = self._without_announcement(data)
         keep = data[: max(0, self._limits.output_bytes - self._taken[name])]
         self._taken[name] += len(keep)
         self._dropped += len(data) - len(keep)
@@ -381,6 +442,15 @@ class Process:
         elif keep:
             self._kept[name] += keep
         return True
+
+    def _without_announcement(self, data: bytes) -> bytes:
+        """What of *data* comes after the announcement; nothing before it, which only a failing sandbox says."""
+        self._before = (self._before + data)[-CHUNK_BYTES:]
+        before, found, after = self._before.partition(self._announcement)
+        if not found:
+            return b""
+        self._before, self._announcement = before, b""
+        return after
 
     def _watch(self) -> None:
         """Strike when the whole tree uses more processes (threads count), memory or processors than it may."""
@@ -393,7 +463,7 @@ class Process:
         if self._group is not None:
             struck = self._group.struck()
             return struck or ("cpu" if limits.cpu_seconds and self._group.cpu_seconds() > limits.cpu_seconds else "")
-        found = _descendants(self.pid).values()
+        found = _walk(self.pid).values()
         if limits.processes and sum(stat.threads for stat in found) > limits.processes:
             return "processes"
         if limits.memory_bytes and sum(stat.resident for stat in found) > limits.memory_bytes:
@@ -511,7 +581,7 @@ def temporary_directory() -> Iterator[Path]:
     path = Path(tempfile.mkdtemp(prefix="lab2-"))
     base = control_groups()
     with subprocess.Popen(
-        ["sh", "-c", CLEANER, "lab2-cleaner", str(path), _run_name, MARK, *(base.paths() if base else ())],
+        ["sh", "-c", CLEANER, "lab2-cleaner", str(path), run_name(), MARK, *(base.paths() if base else ())],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

@@ -38,8 +38,9 @@ def numbers_in(line: str, beside: Iterable[str] = ()) -> frozenset[int]:
         beside: Texts whose own numbers do not count: a greeting that ends in a count must not pass for that number.
     """
     text = said(line)
-    for other in beside:
-        text = text.replace(other, " … ")
+    for other in sorted(beside, key=len, reverse=True):
+        if any(letter.isalpha() for letter in other):  # a text that is nothing but a number is no greeting
+            text = text.replace(other, " … ")
     found = {int(number) for number in NUMBER.findall(text)}
     found |= {int(number) for number in SIGNED_AFTER_WORD.findall(text)}
     found |= {-int(number) for number in SIGNED_AFTER_WORD.findall(text)}

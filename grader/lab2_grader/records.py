@@ -56,12 +56,15 @@ class Request(Record, frozen=True):
         env: The whole environment, nothing is inherited.
         cwd: Working directory.
         limits: What it may use.
+        announces: The line with which it says on standard error that it is inside its walls, before the program begins;
+            empty when there are none. It is not kept.
     """
 
     argv: tuple[str, ...]
     env: tuple[tuple[str, str], ...]
     cwd: str
     limits: Limits
+    announces: str = ""
 
 
 class EndedBy(str, Enum):
@@ -244,6 +247,8 @@ class Endpoint(Row, frozen=True):
         type: Type of the topic, for example `std_msgs/msg/Int8`.
         reliability: `reliable` or `best-effort`.
         durability: `volatile` or `transient-local`.
+        program: The executable of the package whose process (or whose child) it belongs to, by the process id in its
+            identity and the process table; `-` for a process that is none of them; empty when unknown.
     """
 
     at: float
@@ -255,6 +260,7 @@ class Endpoint(Row, frozen=True):
     type: str
     reliability: str
     durability: str
+    program: str = ""
 
 
 class Message(Row, frozen=True):
@@ -342,7 +348,11 @@ class ProgramEnded(Row, frozen=True):
 
 
 class Measured(Row, frozen=True):
-    """A number the observer worked out: `graph_seconds`, `period_seconds`, `follows_ros_clock` (1 or 0), `dropped_bytes`."""
+    """A number the observer worked out.
+
+    `graph_seconds`, `period_seconds`, `follows_ros_clock` (1 or 0), and what was more than is kept: `dropped_bytes`,
+    `dropped_lines`, `dropped_messages`.
+    """
 
     at: float
     name: str

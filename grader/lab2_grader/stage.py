@@ -38,7 +38,8 @@ from lab2_grader.stand_in import launched, program
 
 REMAPPING = re.compile(r" (?:-r|--remap) (\S+:=\S+)")
 INSTALLED = f"{sandbox.WORKSPACE}/install"
-OBSERVER_OUTPUT_BYTES = 40_000_000
+OBSERVER_OUTPUT_BYTES = 100_000_000  # more than it can have to say: what it keeps of a scene is limited
+OBSERVER_MEMORY_BYTES = 1_000_000_000  # beyond what the submission may use
 OBSERVER_GRACE_SECONDS = 30.0
 EARLY_OBSERVERS = 3  # conversation, listener, originals: what a normal submission needs
 WORDS = (
@@ -75,6 +76,7 @@ class _Observer:
         self._world = self._domain.environment() if self._domain else ()
         environment = dict(ros.environment(str(home)) + self._world)
         here = str(Path(__file__).parent.parent)
+        environment["PYTHONNOUSERSITE"] = "1"
         environment["PYTHONPATH"] = ":".join(filter(None, (here, environment.get("PYTHONPATH", ""))))
         conversation = lab.limits().conversation
         seconds = conversation.realtime_seconds + conversation.timelapse_seconds + OBSERVER_GRACE_SECONDS
@@ -82,7 +84,11 @@ class _Observer:
             argv=(sys.executable, "-m", "lab2_grader.observe"),
             env=tuple(environment.items()),
             cwd="/",
-            limits=Limits(seconds=seconds, output_bytes=OBSERVER_OUTPUT_BYTES),
+            limits=Limits(
+                seconds=seconds,
+                output_bytes=OBSERVER_OUTPUT_BYTES,
+                memory_bytes=OBSERVER_MEMORY_BYTES + lab.limits().resources.memory_bytes,
+            ),
         )
         self._process = process.Process(sandbox.private_network(request, isolation), self._on_output, keep_stdin=True)
 
@@ -298,12 +304,15 @@ def _launch_path(build: Build, name: str) -> str:
 
 
 def _shows_talker(scene: Scene, talker: str) -> bool:
-    """Whether the launch let the *talker* be judged: it ran, spoke, and nobody else spoke on either topic."""
+    """Whether the launch let the *talker* be judged: it ran, spoke, and nobody else spoke on either topic.
+
+    Who spoke is told by the process that a publisher belongs to, not by the name that its node gives itself.
+    """
     specification = lab.specification()
     topics = (specification.number_topic.name, specification.text_topic.name)
     started = any(isinstance(event, ProcessSeen) and event.executable == talker for event in scene.events)
     speakers = [
-        (event.node, event.topic)
+        event
         for event in scene.events
         if isinstance(event, Endpoint)
         and event.event == "appeared"
@@ -311,7 +320,8 @@ def _shows_talker(scene: Scene, talker: str) -> bool:
         and event.topic in topics
     ]
     heard = any(isinstance(event, Message) and event.topic == topics[0] for event in scene.events)
-    return started and heard and len({node for node, _ in speakers}) == 1 and len(speakers) <= len(topics)
+    alone = len({event.node for event in speakers}) == 1 and len(speakers) <= len(topics)
+    return started and heard and alone and all(event.program in (talker, "") for event in speakers)
 
 
 def _remappings_that_help(scenes: Mapping[SceneName, Scene], listener: str) -> tuple[str, ...]:

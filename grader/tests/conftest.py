@@ -49,5 +49,7 @@ def samples(
             text = (package / file).read_text()
             assert text.count(find) == 1, (file, find)
             (package / file).write_text(text.replace(find, replace))
-        folders[name] = pipeline.grade(str(package), tmp_path_factory.mktemp(f"{name}-out"), means, lambda doing: None)[1]
+        folders[name] = pipeline.grade(str(package), tmp_path_factory.mktemp(f"{name}-out"), means, lambda doing: None)[
+            1
+        ]
     return folders

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 from lab2_grader.report.pictures import (
     GraphEdge,
@@ -22,9 +22,9 @@ SVG = "{http://www.w3.org/2000/svg}"
 RIGHT = [*range(128), *range(128)]
 
 
-def described(picture: str) -> tuple[ElementTree.Element, str]:
+def described(picture: str) -> tuple[ET.Element, str]:
     """The picture as XML, and its text for those who do not see it."""
-    root = ElementTree.fromstring(picture)
+    root = ET.fromstring(picture)
     description = root.find(f"{SVG}desc")
     assert description is not None and description.text
     assert root.get("role") == "img"
@@ -101,7 +101,7 @@ def test_names_from_a_submission_cannot_break_out() -> None:
 
 def test_an_empty_graph_is_a_picture_too() -> None:
     described(graph_svg([GraphNode("n", "/alone")], [], [], id_prefix="e", title="One node"))
-    ElementTree.fromstring(graph_svg([], [], [], id_prefix="e", title="Nothing", desc="Nothing was seen."))
+    ET.fromstring(graph_svg([], [], [], id_prefix="e", title="Nothing", desc="Nothing was seen."))
 
 
 def test_the_first_departure_is_found_and_named() -> None:
@@ -123,7 +123,10 @@ def test_a_right_sequence_has_no_ring() -> None:
 def test_gaps_and_nothing_can_be_drawn() -> None:
     described(sequence_svg([], RIGHT, id_prefix="s", title="Nothing"))
     _, text = described(sequence_svg([0, None, 2], [0, 1, 2], id_prefix="s", title="A gap"))
-    assert "message 2 is nothing, expected 1" in text
+    assert "All are as expected." in text, "a gap is no departure"
+    _, text = described(sequence_svg([0, None, 3], [0, 1, 2], id_prefix="s", title="A gap and a departure"))
+    assert "message 3 is 3, expected 2" in text
+    assert "Around it: 0, nothing, 3." in text
     described(sequence_svg([5] * 4, [], id_prefix="s", title="Nothing was expected"))
 
 

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import functools
+import os
 import shutil
+import subprocess
 from pathlib import Path
 
 import msgspec
+
+from lab2_grader import lab
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -144,9 +148,50 @@ class Pair(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     of: tuple[str, str]
 
 
+class Repository(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The solution in a git repository, and what becomes of the two checks that look at it.
+
+    Args:
+        name: Unique.
+        about: What is special about it, in one line.
+        script: Shell commands, run in the package's folder; `$OWN` and `$COURSE` are remotes.
+        fails: As of an animal.
+        not_assessed: Checks for which there is nothing to judge.
+    """
+
+    name: str
+    about: str
+    script: str
+    fails: dict[str, tuple[str, str]] = {}
+    not_assessed: tuple[str, ...] = ()
+
+    def statuses(self) -> dict[str, str]:
+        """The expected status of each check."""
+        expected = dict.fromkeys(CHECKS, "pass") | dict.fromkeys(self.fails, "fail")
+        return expected | dict.fromkeys(self.not_assessed, "not-assessed")
+
+    def build(self, folder: Path) -> Path:
+        """Make the repository below the empty *folder*, and return its own folder."""
+        package, own = folder / "lab2", folder / "own.git"
+        shutil.copytree(ROOT / "solution", package, ignore=shutil.ignore_patterns("__pycache__"))
+        environment = {
+            "PATH": os.environ["PATH"],
+            "HOME": str(folder),
+            "GIT_CONFIG_NOSYSTEM": "1",
+            **dict.fromkeys(("GIT_AUTHOR_NAME", "GIT_COMMITTER_NAME"), "A Student"),
+            **dict.fromkeys(("GIT_AUTHOR_EMAIL", "GIT_COMMITTER_EMAIL"), "student@example.com"),
+            "OWN": str(own),
+            "COURSE": lab.course().template_clone_url,
+        }
+        subprocess.run(["git", "init", "--quiet", "--bare", str(own)], check=True, env=environment)
+        subprocess.run(["sh", "-eu", "-c", self.script], check=True, env=environment, cwd=package)
+        return package
+
+
 class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     animal: tuple[Animal, ...] = ()
     pair: tuple[Pair, ...] = ()
+    repository: tuple[Repository, ...] = ()
 
 
 @functools.cache
@@ -163,6 +208,12 @@ def animals() -> dict[str, Animal]:
             raise ValueError(f"two animals are called {animal.name}")
         found[animal.name] = animal
     return found
+
+
+@functools.cache
+def repositories() -> dict[str, Repository]:
+    """Every repository by name."""
+    return {repository.name: repository for file in _files() for repository in file.repository}
 
 
 @functools.cache

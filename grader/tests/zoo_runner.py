@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
-from zoo_builder import Animal
+from zoo_builder import Animal, Repository
 
 from lab2_grader import pipeline
-from lab2_grader.records import Result, Status
+from lab2_grader.records import CheckResult, Result, Status, Verdict
 
 AT_ONCE = 3  # two cores: a submission waits for half of its time
 
@@ -51,24 +51,25 @@ class Zoo:
         self._pool.shutdown(cancel_futures=True)
 
 
-def complaints(animal: Animal, result: Result) -> list[str]:
-    """In which ways *result* is not what *animal* must get; empty when it is."""
+def complaints(animal: Animal | Repository, checks: Iterable[CheckResult | Verdict]) -> list[str]:
+    """In which ways *checks* are not what *animal* must get; empty when they are."""
     found = []
     expected = animal.statuses()
-    for check in result.checks:
-        seen = (
-            f"{check.id}: {check.status.value} {check.message} {check.because or ''} ({check.observed} | {check.hint})"
-        )
-        if check.status.value != expected[check.id]:
-            found.append(f"{seen} instead of {expected[check.id]}")
+    for check in checks:
+        name = check.id if isinstance(check, CheckResult) else check.check
+        seen = f"{name}: {check.status.value} {check.message} {check.because or ''} ({check.observed} | {check.hint})"
+        if check.status.value != expected[name]:
+            found.append(f"{seen} instead of {expected[name]}")
         elif check.status is Status.FAIL:
-            key, fragment = animal.fails[check.id]
+            key, fragment = animal.fails[name]
             if check.message != key:
                 found.append(f"{seen} instead of {key}")
             if fragment not in check.hint:
                 found.append(f"{seen} without '{fragment}'")
             if not (check.expected and check.observed and check.hint):
                 found.append(f"{seen} without words")
-        elif check.status is Status.BLOCKED and animal.blocked[check.id] not in check.because:
-            found.append(f"{seen} instead of because of {animal.blocked[check.id]}")
+        elif (
+            check.status is Status.BLOCKED and isinstance(animal, Animal) and animal.blocked[name] not in check.because
+        ):
+            found.append(f"{seen} instead of because of {animal.blocked[name]}")
     return found

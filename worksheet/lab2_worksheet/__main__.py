@@ -9,7 +9,7 @@ from pathlib import Path
 
 from lab2_grader.errors import UsageError
 
-from lab2_worksheet import play, recording
+from lab2_worksheet import handout, play, recording
 from lab2_worksheet.build import build
 from lab2_worksheet.errors import SourceError
 from lab2_worksheet.places import OUTPUT
@@ -38,6 +38,8 @@ def main(argv: list[str] | None = None) -> int:
 
 def _build(out: Path) -> int:
     begun = time.perf_counter()
+    for path in handout.write():
+        print(f"   facts into  {path}")
     written = build(out)
     for file in written:
         print(f"{file.size:>8,} bytes  {file.path}")

@@ -113,6 +113,8 @@ class HtmlBlocks:
             "done": self.done,
             "line": self.line,
             "lines": self.lines,
+            "Line": lambda path, anchor: self.line(path, anchor, word="Line"),
+            "Lines": lambda path, first, last: self.lines(path, first, last, word="Lines"),
             "listing": self.listing,
             "more": self.more,
             "note": self.note,
@@ -154,19 +156,19 @@ class HtmlBlocks:
         body = listings.numbered(listings.template(path), first=first, last=last)
         return self._keep(self._templates.listing(caption or path, body))
 
-    def line(self, path: str, anchor: str) -> Markup:
+    def line(self, path: str, anchor: str, word: str = "line") -> Markup:
         """`line 12`, as a link to the one line of the listing that contains *anchor*."""
         listing = listings.template(path)
         number = listing.line(anchor)
-        return self._keep_inline(f'<a class="to-line" href="#{listing.key}-L{number}">line {number}</a>')
+        return self._keep_inline(f'<a class="to-line" href="#{listing.key}-L{number}">{word} {number}</a>')
 
-    def lines(self, path: str, first: str, last: str) -> Markup:
+    def lines(self, path: str, first: str, last: str, word: str = "lines") -> Markup:
         """`lines 12 to 20`, from the line that contains *first* to the one that contains *last*."""
         listing = listings.template(path)
         start, end = listing.line(first), listing.line(last)
         if start >= end:
             raise SourceError(f"{path}: {first!r} (line {start}) must stand above {last!r} (line {end}).")
-        return self._keep_inline(f'<a class="to-line" href="#{listing.key}-L{start}">lines {start} to {end}</a>')
+        return self._keep_inline(f'<a class="to-line" href="#{listing.key}-L{start}">{word} {start} to {end}</a>')
 
     # --- commands --------------------------------------------------------------------------------
 

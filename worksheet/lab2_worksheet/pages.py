@@ -14,7 +14,7 @@ from jinja2.exceptions import TemplateError
 from lab2_grader.report.pictures import PICTURE_CSS
 from markupsafe import Markup
 
-from lab2_worksheet import markdown
+from lab2_worksheet import handout, markdown
 from lab2_worksheet.blocks import HtmlBlocks, MarkdownBlocks
 from lab2_worksheet.errors import SourceError
 from lab2_worksheet.manifest import commands, facts, questions, tasks
@@ -37,6 +37,7 @@ def editions() -> Editions:
     Raises:
         SourceError: A source is wrong; the text says which and how.
     """
+    handout.check()
     student = _body(staff=False)
     return Editions(
         student=_page(student, "student"),

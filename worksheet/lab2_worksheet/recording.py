@@ -44,6 +44,8 @@ _CHANGES = (
     (re.compile(r"GID: [0-9a-f.]+"), "GID: <number>"),
     (re.compile(r"\[main [0-9a-f]{7,}\]"), "[main <id>]"),
 )
+# Lines that depend on how quickly nodes found one another.
+_BY_CHANCE = ("Waiting for at least 1 matching subscription", "WARNING: topic [")
 
 
 def normalise(text: str, home: str, host: str) -> tuple[str, ...]:
@@ -57,7 +59,7 @@ def normalise(text: str, home: str, host: str) -> tuple[str, ...]:
     text = text.replace(home, "~").replace(host, "<computer>")
     for pattern, replacement in _CHANGES:
         text = pattern.sub(replacement, text)
-    lines = [line.rstrip() for line in text.expandtabs(8).splitlines()]
+    lines = [line.rstrip() for line in text.expandtabs(8).splitlines() if not line.startswith(_BY_CHANCE)]
     while lines and not lines[-1]:
         lines.pop()
     while lines and not lines[0]:

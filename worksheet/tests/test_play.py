@@ -9,6 +9,7 @@ from lab2_worksheet.recording import recording
 from lab2_worksheet.terminal import Terminal
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not play.available(), reason="ros2, colcon and git are not all on the path")
 def test_every_command_does_what_the_page_says() -> None:
     played = play.play()

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from lab2_grader.checks import source
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
 from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
-from lab2_grader.reading import numbers_in
+from lab2_grader.reading import numbers_in, said
 from lab2_grader.records import Message, SceneName, Status, Verdict
 from lab2_grader.stand_in import launched
 
@@ -17,6 +18,8 @@ Earlier = Mapping[str, Verdict]
 CAUGHT = re.compile(r"Caught (?:multiple exceptions?|exception) .*?: ?(.*)$")
 NO_EXECUTABLE = re.compile(r"executable '([^']*)' not found on the libexec directory")
 NO_PACKAGE = re.compile(r"""[Pp]ackage ['"][^'"]*['"] not found""")
+NEARBY, NEARBY_PER_MESSAGE = 100, 2  # lines that can belong to a message: so many, and so many for each before it
+NOT_WHAT_IT_RECEIVES = ("silent", "others", "noise", "no-f-string")  # a listener whose lines answer nothing
 ENOUGH_ANSWERS = 8  # of the slow dozen; the first few may be lost while the pair still discovers each other
 
 
@@ -35,11 +38,14 @@ def launch_starts(view: View, earlier: Earlier) -> Verdict:
     missing = [name for name, executable in pair.items() if executable not in started]
     if not missing:
         return passed(check)
+    if unseen := [name for name in missing if name in scene.said_to_have_died()]:
+        return inconclusive(check, "inconclusive-unseen", name=names(unseen))
     error = launch_error(scene)
     if asked := NO_EXECUTABLE.search(error):
         if asked[1] in (numeric.talker, numeric.listener):
             return blocked(check, "entry-points")
-        return failed(check, "no-executable", asked=asked[1], found=names(build.executables))
+        file, line = source.written_in(view, _launch_source(view), asked[1])
+        return failed(check, "no-executable", file, line, asked=asked[1], found=names(build.executables))
     if any(name not in build.executables for name in missing) and earlier["entry-points"].status is Status.FAIL:
         return blocked(check, "entry-points")
     if NO_PACKAGE.search(error):
@@ -80,7 +86,8 @@ def launch_only_numeric(view: View, earlier: Earlier) -> Verdict:
     started = scene.started()
     others = [name for name in started if name not in numeric]
     if others:
-        return failed(check, "others", others=names(others))
+        file, line = source.written_in(view, _launch_source(view), others[0])
+        return failed(check, "others", file, line, others=names(others))
     if not started or launch_error(scene):
         return blocked(check, *(earlier["launch-starts"].because or ("launch-starts",)))
     # Two of one in the place of the other is one fault, and launch-starts has it.
@@ -101,13 +108,21 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
     if scene is None or starts.status is not Status.PASS:
         return blocked(check, "launch-starts")
     spoken = _spoken(view, scene)
-    answered = [message for message in spoken if _answered(message, view, scene)]
+    printed = _printed(view, scene, spoken)
+    answered = [message for message in spoken if message.data in printed]
     listener = earlier["listener-numeric"]
-    received_but_not_printed = ("silent", "some", "noise", "died-on-number")
-    if _is_conversation(spoken, answered) and listener.message not in received_but_not_printed:
+    build, numeric, topic = view.build, view.specification.numeric, view.specification.number_topic.name
+    assert build is not None
+    talker, own_listener = launched(numeric.talker, build), launched(numeric.listener, build)
+    theirs = scene.spoke(topic, talker) and scene.heard(topic, own_listener)
+    if theirs and _is_conversation(spoken, answered) and listener.message not in NOT_WHAT_IT_RECEIVES:
         return passed(check)
     if earlier["entry-points"].message in ("dangling", "function", "wrong-module", "misplaced"):
         return blocked(check, "entry-points")
+    if not scene.spoke(topic, talker):
+        speakers = {endpoint.program for endpoint in scene.appeared("publisher") if endpoint.topic == topic} - {talker}
+        others = names("another process" if program == "-" else program for program in speakers)
+        return failed(check, "strangers", others=others)
     for cause in ("talker-type", "talker-start", "listener-numeric"):
         silent_start = cause != "talker-start" or earlier[cause].message in ("silent", "not-numbers")
         if earlier[cause].status is not Status.PASS and silent_start:
@@ -115,7 +130,7 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
     if not spoken:
         return failed(check, "nothing")
     shown = ", ".join(str(message.data) for message in spoken[:5]) + (" …" if len(spoken) > 5 else "")
-    return failed(check, "silent", shown=shown, printed=len(answered) or "none", count=len(spoken))
+    return failed(check, "silent", shown=shown, printed=len(answered), count=len(spoken))
 
 
 def _spoken(view: View, scene: SceneView) -> list[Message]:
@@ -126,22 +141,27 @@ def _spoken(view: View, scene: SceneView) -> list[Message]:
     return [message for message in numbers if slow <= message.at < fast] or numbers[:12]
 
 
-def _answered(message: Message, view: View, scene: SceneView) -> bool:
-    """Whether the listener printed that number after it was published, other than as part of a greeting."""
-    texts = [str(other.data) for other in scene.messages if other.topic == view.specification.text_topic.name]
-    near = [text for text in texts if str(message.data) in text]
+def _printed(view: View, scene: SceneView, spoken: list[Message]) -> frozenset[int]:
+    """The numbers that the listener printed while the *spoken* ones came, other than as part of a greeting.
+
+    Lines and messages reach the grader on different ways and in no sure order, so lines are counted, not timed.
+    """
     build = view.build
     assert build is not None
-    listener = launched(view.specification.numeric.listener, build)
-    known = {line.source for line in scene.lines}
-    sources = (
-        {listener} if listener in known else known - {"launch", launched(view.specification.numeric.talker, build)}
+    topic = view.specification.text_topic.name
+    talker, listener = (
+        launched(name, build) for name in (view.specification.numeric.talker, view.specification.numeric.listener)
     )
-    return any(
-        message.data in numbers_in(line.text, near)
-        for line in scene.lines
-        if line.source in sources and line.at >= message.at - 0.05
-    )
+    sources = {line.source for line in scene.lines}
+    # Processes that a launch file starts with `ros2 run` are all labelled `ros2`.
+    sources = {listener} if listener in sources else sources - {"launch", talker}
+    enough = NEARBY + NEARBY_PER_MESSAGE * (scene.messages.index(spoken[-1]) + 1 if spoken else 0)
+    texts = {str(other.data) for other in scene.messages[:enough] if other.topic == topic}
+    lines = [said(line.text) for line in scene.lines if line.source in sources][:enough]
+    found: set[int] = set()
+    for line in lines:
+        found |= numbers_in(line, [text for text in texts if text and text in line])
+    return frozenset(found)
 
 
 def _is_conversation(spoken: list[Message], answered: list[Message]) -> bool:
@@ -157,6 +177,11 @@ def _our_fault(check: str, scene: SceneView) -> Verdict | None:
     if scene.scene.fault:
         return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
     return None
+
+
+def _launch_source(view: View) -> str:
+    """The launch file within the package."""
+    return f"launch/{view.specification.numeric.launch_file}"
 
 
 def launch_error(scene: SceneView) -> str:

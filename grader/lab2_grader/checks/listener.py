@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from lab2_grader import messages
+from lab2_grader.checks import source
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
 from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
@@ -31,18 +33,19 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
     sent = _sent(scene, topic.name)
     printed = _numbers_printed(scene)
     missing = [row for row in sent if int(row.data) not in printed.get(row.at, frozenset())]
-    strange = set().union(*printed.values()) - {int(row.data) for row in sent} if printed else set()
+    strange = frozenset[int]().union(*printed.values()) - {int(row.data) for row in sent}
     if sent and not missing and _death(scene) != topic.name:
-        return failed(check, "noise") if len(_plausible(strange)) > NOISE else passed(check)
+        return failed(check, "noise") if len(strange) > NOISE else passed(check)
     if death := _death(scene):
+        file, line = scene.place_of_error(scene.scene.label, view.specification.package)
         if death == topic.name:
-            return failed(check, "died-on-number", error=scene.error_of(scene.scene.label))
+            return failed(check, "died-on-number", file, line, error=scene.error_of(scene.scene.label))
         if death == AT_START and scene.ended is not None and scene.ended.code == 0:
             return failed(check, "ended")
         if death == AT_START:
-            return failed(check, "died", error=scene.error_of(scene.scene.label))
+            return failed(check, "died", file, line, error=scene.error_of(scene.scene.label))
         return blocked(check, "listener-chatter")
-    if wrong := _unsuitable(check, topic.name, topic.type, scene):
+    if wrong := _unsuitable(check, topic.name, topic.type, view, scene):
         return wrong
     if len(missing) > len(sent) // 2:
         if literal := next((line for line in scene.lines if LITERAL.search(line.text)), None):
@@ -72,10 +75,11 @@ def listener_chatter(view: View, earlier: Earlier) -> Verdict:
         return passed(check)
     death = _death(scene)
     if death == topic.name:
-        return failed(check, "died", error=scene.error_of(scene.scene.label))
+        file, line = scene.place_of_error(scene.scene.label, view.specification.package)
+        return failed(check, "died", file, line, error=scene.error_of(scene.scene.label))
     if death and not missing:
         return blocked(check, "listener-numeric")
-    if wrong := _unsuitable(check, topic.name, topic.type, scene):
+    if wrong := _unsuitable(check, topic.name, topic.type, view, scene):
         return wrong
     return failed(check, "silent", sent=len(sent), missing=len(missing), shown=_last_line(scene))
 
@@ -94,24 +98,24 @@ def _death(scene: SceneView) -> str:
 
 
 def _numbers_printed(scene: SceneView) -> dict[float, frozenset[int]]:
-    """For each message that was sent, the numbers that were printed from then on."""
+    """For each message that was sent, the numbers an Int8 can carry that were printed from then on."""
     texts = [str(row.data) for row in scene.sent if isinstance(row.data, str)]
-    lines = [(line.at, numbers_in(line.text, texts)) for line in scene.lines]
+    lines = [(line.at, _plausible(numbers_in(line.text, texts))) for line in scene.lines]
     found: dict[float, frozenset[int]] = {}
-    later: frozenset[int] = frozenset()
+    later: set[int] = set()
     for row in sorted(scene.sent, key=lambda row: row.at, reverse=True):
         while lines and lines[-1][0] >= row.at:
             later |= lines.pop()[1]
-        found[row.at] = later
+        found[row.at] = frozenset(later)
     return found
 
 
-def _plausible(numbers: set[int]) -> set[int]:
+def _plausible(numbers: frozenset[int]) -> frozenset[int]:
     """Those that an Int8 could have carried."""
-    return {number for number in numbers if -128 <= number <= 127}
+    return frozenset(number for number in numbers if -128 <= number <= 127)
 
 
-def _unsuitable(check: str, topic: str, type_name: str, scene: SceneView) -> Verdict | None:
+def _unsuitable(check: str, topic: str, type_name: str, view: View, scene: SceneView) -> Verdict | None:
     """Why the listener could receive nothing on *topic*, as the graph shows it; None when it could."""
     subscriptions = scene.appeared("subscription")
     mine = [endpoint for endpoint in subscriptions if endpoint.topic == topic]
@@ -119,15 +123,17 @@ def _unsuitable(check: str, topic: str, type_name: str, scene: SceneView) -> Ver
         others = {endpoint.topic for endpoint in subscriptions if not endpoint.topic.startswith("/parameter")}
         near = _near_subscription(topic, type_name, subscriptions)
         if near:
-            return failed(check, "near-topic", near=near, near_name=near.lstrip("/"))
+            file, line = source.written(view, scene.scene.label, near)
+            return failed(check, "near-topic", file, line, near=near, near_name=near.lstrip("/"))
         return failed(check, "no-subscription", others=names(others))
     if all(endpoint.type != type_name for endpoint in mine):
-        return failed(check, "wrong-type", found=names(endpoint.type for endpoint in mine))
+        file, line = source.written(view, scene.scene.label, topic)
+        return failed(check, "wrong-type", file, line, found=names(endpoint.type for endpoint in mine))
     right = [endpoint for endpoint in mine if endpoint.type == type_name]
     if all(endpoint.durability == "transient-local" for endpoint in right):
-        return failed(check, "qos", found="transient local")
+        return failed(check, "qos", found=messages.phrase("transient-local"))
     if not any(row.topic == topic for row in scene.sent):  # nobody matched, whatever the reason
-        return failed(check, "qos", found="a deadline or the like")
+        return failed(check, "qos", found=messages.phrase("other-qos"))
     return None
 
 
@@ -141,4 +147,4 @@ def _near_subscription(topic: str, type_name: str, subscriptions: list[Endpoint]
 
 def _last_line(scene: SceneView) -> str:
     lines = [said(line.text) for line in scene.lines if line.text.strip()]
-    return f"the last line it printed was '{lines[-1]}'" if lines else "it printed nothing at all"
+    return messages.phrase("last-line", line=lines[-1]) if lines else messages.phrase("no-line")

@@ -14,7 +14,16 @@ PARTICIPANT = 24  # hexadecimal digits of a gid that name the participant (DDSI-
 def notes(evidence: Evidence) -> tuple[str, ...]:
     """The notes on *evidence*, a sentence each."""
     view = View(evidence)
-    return (*evidence.faults, *_period(view), *_print(view), *_names(view), *_stand_ins(view), *_dropped(view))
+    return (
+        *evidence.faults,
+        *([messages.note("isolation-off")] if evidence.runtime.isolation == "off" else []),
+        *_period(view),
+        *_print(view),
+        *_names(view),
+        *_stand_ins(view),
+        *_limits(view),
+        *_dropped(view),
+    )
 
 
 def _period(view: View) -> list[str]:
@@ -56,12 +65,26 @@ def _stand_ins(view: View) -> list[str]:
     for name, program in wanted.items():
         scene = view.scene(name)
         if scene is not None and (scene.scene.started_with != "executable" or scene.scene.label != program):
-            found.append(
-                messages.note("stand-in", name=program, used=f"the {scene.scene.started_with} {scene.scene.label}")
-            )
+            kind, used = scene.scene.started_with, scene.scene.label
+            found.append(messages.note("stand-in", name=program, kind=kind, used=used))
+    return found
+
+
+def _limits(view: View) -> list[str]:
+    """What was stopped because it used too much, with what to do about it."""
+    found = []
+    for scene in view.scenes():
+        if scene.ended is not None and scene.ended.limit:
+            about = messages.limits() | {"scene": scene.scene.name.value, "seconds": round(scene.ended.at)}
+            found.append(messages.note(f"limit-{scene.ended.limit}", **about))
+        if any("No space left on device" in line.text or "File too large" in line.text for line in scene.lines):
+            found.append(messages.note("limit-disk", **messages.limits() | {"scene": scene.scene.name.value}))
     return found
 
 
 def _dropped(view: View) -> list[str]:
-    dropped = sum(int(scene.measured.get("dropped_bytes", 0)) for scene in view.scenes())
-    return [messages.note("output", bytes=dropped)] if dropped else []
+    found = []
+    for what, key in (("dropped_bytes", "output"), ("dropped_lines", "lines"), ("dropped_messages", "messages")):
+        if dropped := sum(int(scene.measured.get(what, 0)) for scene in view.scenes()):
+            found.append(messages.note(key, count=dropped))
+    return found

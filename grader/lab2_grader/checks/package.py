@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from lab2_grader import messages
+from lab2_grader.checks import source
 from lab2_grader.checks.verdicts import failed, inconclusive, passed
 from lab2_grader.checks.view import View, names
 from lab2_grader.near import nearest
@@ -21,14 +23,14 @@ def package_builds(view: View, earlier: Earlier) -> Verdict:
     """The package is found and `colcon build` builds it."""
     check, build = "package-builds", view.build
     if build is None:
-        fault = view.evidence.faults[0] if view.evidence.faults else "the build was never reached"
+        fault = view.evidence.faults[0] if view.evidence.faults else messages.phrase("no-build")
         return inconclusive(check, "inconclusive-scene", fault=fault)
     if build.ok:
         return passed(check)
     if build.ended_by is EndedBy.DEADLINE:
         return failed(check, "time", seconds=round(build.seconds))
     if build.ended_by is EndedBy.LIMIT:
-        return failed(check, "limit", what=build.limit)
+        return failed(check, f"limit-{build.limit}")
     if build.code == 0:
         return failed(check, "nothing-installed")
     error = _last_error(build)
@@ -42,7 +44,7 @@ def package_builds(view: View, earlier: Earlier) -> Verdict:
 def _last_error(build: Build) -> str:
     found = [match[1] for line in build.log.splitlines() if (match := ERROR_LINE.match(line))]
     lines = [line for line in build.log.splitlines() if line.strip()]
-    return found[-1] if found else lines[-1] if lines else f"exit code {build.code}"
+    return found[-1] if found else lines[-1] if lines else messages.phrase("exit-code", code=str(build.code))
 
 
 def entry_points(view: View, earlier: Earlier) -> Verdict:
@@ -61,17 +63,21 @@ def entry_points(view: View, earlier: Earlier) -> Verdict:
             return failed(check, "replaced", name=lost[0], missing=names(lost), found=found)
         for name in (name for name in missing if name in numeric):
             if near := nearest(name, build.executables, (*numeric, *original)):
-                return failed(check, "near", name=name, near=near)
-        return failed(check, "missing", name=missing[0], missing=names(missing), found=found)
+                file, line = source.written_in(view, "setup.py", near)
+                return failed(check, "near", file, line, name=name, near=near)
+        file, line = source.written_in(view, "setup.py", "console_scripts")
+        return failed(check, "missing", file, line, name=missing[0], missing=names(missing), found=found)
     targets = {point.name: point.target for point in build.entry_points}
     for name in (*numeric, *original):
         if name in build.dangling:
             return _dangling(view, build, name, targets[name])
         if module := misdirected(name, build):
-            return failed(check, "wrong-module", name=name, target=targets[name], module=module)
+            file, line = source.written_in(view, "setup.py", targets[name])
+            return failed(check, "wrong-module", file, line, name=name, target=targets[name], module=module)
     for name in (*numeric, *original):
         if name in targets and _function_is_missing(view, name, targets[name]):
-            return failed(check, "function", name=name, target=targets[name])
+            file, line = source.written_in(view, "setup.py", targets[name])
+            return failed(check, "function", file, line, name=name, target=targets[name])
     return passed(check)
 
 
@@ -84,7 +90,8 @@ def _dangling(view: View, build: Build, name: str, target: str) -> Verdict:
         if misplaced and misplaced != f"{package}/{name}.py":
             return failed(check, "misplaced", name=name, target=target, where=misplaced)
     modules = names(module for module in build.modules if module != "__init__")
-    return failed(check, "dangling", name=name, target=target, modules=modules)
+    file, line = source.written_in(view, "setup.py", target)
+    return failed(check, "dangling", file, line, name=name, target=target, modules=modules)
 
 
 def _function_is_missing(view: View, name: str, target: str) -> bool:

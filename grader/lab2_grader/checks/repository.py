@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from lab2_grader import lab
+from lab2_grader import lab, messages
 from lab2_grader.checks.verdicts import failed, not_assessed, passed
 from lab2_grader.checks.view import View, names
 from lab2_grader.records import Verdict
@@ -56,6 +56,6 @@ def git_clean(view: View, earlier: Earlier) -> Verdict:
         return not_assessed(check, "not-assessed-git")
     if not git.products:
         return passed(check)
-    more = f" and {git.products_count - 3} more" if git.products_count > 3 else ""
+    more = messages.phrase("more", count=git.products_count - 3) if git.products_count > 3 else ""
     folders = " ".join(sorted({path.split("/")[0] for path in git.products}))
     return failed(check, "products", examples=", ".join(git.products[:3]), more=more, folders=folders)

@@ -7,6 +7,9 @@ from collections.abc import Iterator
 
 from lab2_grader.checks.view import View
 
+Place = tuple[str, int]  # file within the package, line from 1
+NOWHERE: Place = ("", 0)
+
 
 def overwritten_publisher(view: View) -> tuple[str, str, int] | None:
     """(attribute, file, line) where an attribute that holds a publisher is given a second one; None when nowhere."""
@@ -22,8 +25,8 @@ def overwritten_publisher(view: View) -> tuple[str, str, int] | None:
     return None
 
 
-def second_increment(view: View) -> tuple[str, int]:
-    """(file, line) of the second place where one attribute is increased; ("", 0) when there is none."""
+def second_increment(view: View) -> Place:
+    """(file, line) of the second place where one attribute is increased; NOWHERE when there is none."""
     path, tree = _talker(view)
     seen: set[str] = set()
     for node in _walk(tree):
@@ -31,11 +34,11 @@ def second_increment(view: View) -> tuple[str, int]:
             if node.target.attr in seen:
                 return path, node.lineno
             seen.add(node.target.attr)
-    return "", 0
+    return NOWHERE
 
 
-def wrap_comparison(view: View) -> tuple[str, int]:
-    """(file, line) of the condition that is to set the counter back; ("", 0) when there is none."""
+def wrap_comparison(view: View) -> Place:
+    """(file, line) of the condition that is to set the counter back; NOWHERE when there is none."""
     largest = view.specification.number_topic.largest
     path, tree = _talker(view)
     for node in _walk(tree):
@@ -44,13 +47,59 @@ def wrap_comparison(view: View) -> tuple[str, int]:
             for part in ast.walk(node.test)
         ):
             return path, node.lineno
-    return "", 0
+    return NOWHERE
+
+
+def early_increment(view: View) -> Place:
+    """Where the counter is increased before the number is published."""
+    path, tree = _talker(view)
+    increments: list[int] = []
+    for node in _walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            increments = []
+        elif isinstance(node, ast.AugAssign):
+            increments.append(node.lineno)
+        elif _is_call_of(node, "publish") and increments:
+            return path, increments[0]
+    return NOWHERE
+
+
+def written(view: View, program: str, text: str) -> Place:
+    """Where the string *text* stands in the file of *program*: a topic's name, with or without its slash."""
+    path, tree = _parsed(view, file_of(view, program))
+    for node in _walk(tree):
+        if (
+            isinstance(node, ast.Constant)
+            and isinstance(node.value, str)
+            and node.value.lstrip("/") == text.lstrip("/")
+        ):
+            return path, node.lineno
+    return NOWHERE
+
+
+def written_in(view: View, path: str, text: str) -> Place:
+    """Where *text* stands in one of the strings of the file *path*."""
+    for node in _walk(_parsed(view, path)[1]):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and text in node.value:
+            return path, node.lineno
+    return NOWHERE
+
+
+def file_of(view: View, program: str) -> str:
+    """The file that *program* is made from, as its entry point says."""
+    package, build = view.specification.package, view.build
+    targets = {point.name: point.target for point in build.entry_points} if build else {}
+    module = targets.get(program, "").partition(":")[0].strip() or f"{package}.{program}"
+    return module.replace(".", "/") + ".py"
 
 
 def _talker(view: View) -> tuple[str, ast.AST | None]:
-    """The talker's file and its tree; no tree when it is not there or does not parse."""
-    package = view.specification.package
-    path = f"{package}/{view.talker_name}.py"
+    """The talker's file and its tree."""
+    return _parsed(view, file_of(view, view.talker_name))
+
+
+def _parsed(view: View, path: str) -> tuple[str, ast.AST | None]:
+    """*path* and its tree; no tree when it is not there or does not parse."""
     text = view.source(path)
     try:
         return path, ast.parse(text) if text else None

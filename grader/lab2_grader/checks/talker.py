@@ -9,7 +9,7 @@ from lab2_grader.checks.sequence import Sequel, Step, analyse, around
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
 from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
-from lab2_grader.records import Status, Verdict
+from lab2_grader.records import SceneName, Status, Verdict
 
 Earlier = Mapping[str, Verdict]
 
@@ -29,6 +29,8 @@ def talker_type(view: View, earlier: Earlier) -> Verdict:
     publishers = view.number_publishers
     died = scene.ended_by_itself(view.talker_name)
     error = scene.error_of(view.talker_name)
+    if died and not view.numbers and scene.scene.name is SceneName.CONVERSATION:
+        return blocked(check, "entry-points")  # there was nothing else that could be run in its place
     if died and not view.numbers:
         if scene.ended is not None and scene.ended.code == 0 and scene.scene.label:
             return failed(check, "ended", talker=view.talker_name)
@@ -37,14 +39,18 @@ def talker_type(view: View, earlier: Earlier) -> Verdict:
             key = "wrong-message"
         elif publishers and "(field)" in error:  # the assertion of the message's conversion to C
             key = "wrong-data"
-        return failed(check, key, error=error, talker=view.talker_name)
+        elif "has no setter" in error:
+            key = "no-setter"
+        file, line = scene.place_of_error(view.talker_name, view.specification.package)
+        return failed(check, key, file, line, error=error, talker=view.talker_name)
     if not publishers:
         return _elsewhere(view)
     types = {endpoint.type for endpoint in publishers}
     if len(types) > 1:
         return failed(check, "two-types", found=names(types))
     if topic.type not in types:
-        return failed(check, "wrong-type", found=names(types))
+        file, line = source.written(view, view.talker_name, topic.name)
+        return failed(check, "wrong-type", file, line, found=names(types))
     if all(endpoint.reliability == "best-effort" for endpoint in publishers):
         return failed(check, "best-effort")
     return passed(check)
@@ -55,7 +61,8 @@ def _elsewhere(view: View) -> Verdict:
     near = view.stray_number_topic or nearest(topic.name, (endpoint.topic for endpoint in view.published))
     if near:
         found = names(endpoint.type for endpoint in view.published if endpoint.topic == near)
-        return failed(check, "near-topic", near=near, found=found, near_name=near.lstrip("/"))
+        file, line = source.written(view, view.talker_name, near)
+        return failed(check, "near-topic", file, line, near=near, found=found, near_name=near.lstrip("/"))
     return failed(check, "no-topic", others=names(endpoint.topic for endpoint in view.published))
 
 
@@ -74,7 +81,8 @@ def talker_start(view: View, earlier: Earlier) -> Verdict:
     first = sequel.values[0] - missed * sequel.common_rise
     if first == smallest:
         return passed(check)
-    return failed(check, "other", first=first, shown=around(sequel.values, 0))
+    file, line = source.early_increment(view)
+    return failed(check, "other", file, line, first=first, shown=around(sequel.values, 0))
 
 
 def talker_step(view: View, earlier: Earlier) -> Verdict:
@@ -153,7 +161,10 @@ def _bad_return(step: Step, sequel: Sequel, view: View) -> Verdict:
 def _never_returned(sequel: Sequel, view: View, scene: SceneView) -> Verdict:
     check, last = "talker-wrap", sequel.values[-1]
     if scene.ended_by_itself(view.talker_name):
-        return failed(check, "died", last=last, error=scene.error_of(view.talker_name), talker=view.talker_name)
+        file, line = scene.place_of_error(view.talker_name, view.specification.package)
+        return failed(
+            check, "died", file, line, last=last, error=scene.error_of(view.talker_name), talker=view.talker_name
+        )
     silent = scene.phases.get("stop", 0.0) - view.numbers[-1].at
     if silent > max(SILENT_SECONDS, 2.5 * scene.measured.get("period_seconds", 0.0)):
         return failed(check, "silent", last=last)

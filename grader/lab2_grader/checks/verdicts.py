@@ -13,7 +13,7 @@ def known(check: str) -> dict[str, messages.Value]:
     original, numeric = specification.original, specification.numeric
     pair = original if check == "originals-kept" else numeric
     topic = texts if check.endswith("chatter") or check == "originals-kept" else numbers
-    return {
+    return messages.limits() | {
         "package": specification.package,
         "workspace": course.workspace,
         "smallest": numbers.smallest,

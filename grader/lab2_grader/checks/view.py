@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Iterable
 from functools import cached_property
 
-from lab2_grader import lab, reading
+from lab2_grader import lab, messages, reading
 from lab2_grader.records import (
     Build,
     EndedBy,
@@ -79,20 +81,34 @@ class SceneView:
         return [endpoint for endpoint in self.endpoints if endpoint.kind == kind and endpoint.event == "appeared"]
 
     def started(self) -> dict[str, int]:
-        """How often each executable was started: as the launcher says, or as it was seen to run, whichever is more."""
-        announced: dict[str, int] = {}
-        for line in self.lines:
-            match = reading.PROCESS_STARTED.match(line.text) if line.source == "launch" else None
-            if match:
-                announced[match[1]] = announced.get(match[1], 0) + 1
-        running: dict[str, int] = {}
-        for process in self.seen:
-            running[process.executable] = running.get(process.executable, 0) + 1
-        if running:
-            announced.pop("ros2", None)  # `ros2 run` as a process: what it ran was seen under its own name
-        return {
-            name: announced.get(name, 0) or running.get(name, 0) for name in sorted(announced.keys() | running.keys())
-        }
+        """How often each executable was started: those that were seen to run, as often as the launcher says.
+
+        What the launcher says alone is no proof: a launch file can print the same lines.
+        """
+        announced = self._announced(reading.PROCESS_STARTED)
+        running = Counter(process.executable for process in self.seen)
+        return {name: announced[name] or running[name] for name in sorted(running)}
+
+    def said_to_have_died(self) -> list[str]:
+        """Executables that were never seen, although the launcher says that they started, and then died."""
+        started, died = self._announced(reading.PROCESS_STARTED), self._announced(reading.PROCESS_DIED)
+        seen = {process.executable for process in self.seen}
+        return sorted(name for name in started if name in died and name not in seen)
+
+    def _announced(self, pattern: re.Pattern[str]) -> Counter[str]:
+        matches = (pattern.match(line.text) for line in self.lines if line.source == "launch")
+        return Counter(match[1] for match in matches if match)
+
+    def spoke(self, topic: str, program: str) -> bool:
+        """Whether all publishers of *topic* belonged to the executable *program*, as far as that is known."""
+        return all(
+            endpoint.program in (program, "") for endpoint in self.appeared("publisher") if endpoint.topic == topic
+        )
+
+    def heard(self, topic: str, program: str) -> bool:
+        """Whether the executable *program* subscribed to *topic*, as far as that is known."""
+        mine = [endpoint for endpoint in self.appeared("subscription") if endpoint.topic == topic]
+        return any(endpoint.program in (program, "") for endpoint in mine)
 
     def ended_by_itself(self, executable: str) -> bool:
         """Whether *executable* was running, or was started, and ended before the grader stopped the scene."""
@@ -122,8 +138,16 @@ class SceneView:
                 return closing
         limit = self.ended.limit if self.ended is not None else ""
         if limit:
-            return f"it struck the limit of {limit}"
-        return next((reading.said(text) for text in reversed(texts) if text.strip()), "it printed nothing")
+            return messages.phrase("limit", limit=limit)
+        return next((reading.said(text) for text in reversed(texts) if text.strip()), messages.phrase("no-error"))
+
+    def place_of_error(self, source: str, package: str) -> tuple[str, int]:
+        """(file within the package, line) that the last traceback of *source* names last; ("", 0) when it names none."""
+        texts = [line.text for line in self.lines if line.source == source]
+        found = [
+            match for text in texts if (match := re.search(rf'File "[^"]*/({package}/[\w/]+\.py)", line (\d+)', text))
+        ]
+        return (found[-1][1], int(found[-1][2])) if found else ("", 0)
 
 
 class View:
@@ -205,5 +229,5 @@ class View:
 
 
 def names(values: Iterable[str]) -> str:
-    """*values* as a list for people; a dash when there are none."""
-    return ", ".join(sorted(set(values))) or "nothing"
+    """*values* as a list for people; the phrase for nothing when there are none."""
+    return ", ".join(sorted(set(values))) or messages.phrase("nothing")

@@ -14,7 +14,7 @@ from lab2_grader.classroom.pool import StoppedError
 from lab2_grader.classroom.records import Graded
 from lab2_grader.classroom.work import Doing, Version
 from lab2_grader.errors import FaultError, UsageError
-from lab2_grader.lab import Rubric, rubric as own_rubric
+from lab2_grader.lab import rubric as own_rubric
 from lab2_grader.score import rubric_digest
 
 CONNECT_SECONDS = 15
@@ -35,17 +35,17 @@ class Cluster:
 
     def __init__(self, address: str) -> None:
         try:
-            import distributed  # noqa: PLC0415: an optional extra
+            import distributed
         except ImportError as error:
             raise UsageError("Dask is not installed here. Run: pip install 'lab2-grader[dask]'") from error
         self._distributed: Any = distributed
         try:
-            self._client: Any = distributed.Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+            self._client: Any = self._distributed.Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             raise UsageError(f"No Dask scheduler answers at {address}: {error}") from error
         self._stopping = False
 
-    def check(self, rubric: Rubric, wanted_ros: str, *, isolation: bool) -> None:
+    def check(self, wanted_ros: str, *, isolation: bool) -> None:
         """Compare every worker with this machine: grader, facts, rubric, ROS, isolation.
 
         Raises:
@@ -81,7 +81,7 @@ class Cluster:
     def lanes(self) -> int:
         """How many submissions to have on their way at once."""
         workers = self._client.scheduler_info(n_workers=-1)["workers"].values()
-        return max(1, WAITING_FOR_EACH_THREAD * sum(worker["nthreads"] for worker in workers))
+        return max(1, WAITING_FOR_EACH_THREAD * sum(int(worker["nthreads"]) for worker in workers))
 
     def perform(self, task: bytes, doing: Doing) -> bytes:
         """Let a worker grade *task*: `work.perform` elsewhere.

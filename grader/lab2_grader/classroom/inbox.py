@@ -97,7 +97,8 @@ def _named_apart(entries: Iterable[Entry]) -> Iterator[Entry]:
 def _folder(inbox: Path, out: Path) -> Found:
     if (inbox / "package.xml").is_file():
         raise UsageError(f"{inbox} is one submission. Grade it with: lab2-grader grade {inbox}")
-    files, folders = [], []
+    files: list[Path] = []
+    folders: list[Path] = []
     for path in sorted(inbox.iterdir()):
         if path.name in PASSED_OVER or path.name.startswith("._") or path.resolve() == out.resolve():
             continue
@@ -264,10 +265,10 @@ def _moodle(parts: Iterable[Part], read: ReadPart, where: str) -> tuple[list[Ent
         path = "/".join(filter(None, (name.rest, *pieces[at + 1 :])))
         files[key].append(Part(part.place, part.member, path or "submission"))
     entries = []
-    for (student, participant), found in files.items():
+    for (student, participant), taken in files.items():
         shown = clean(student, 200)
         keys = (f"Participant {participant}", participant, shown)
-        entry = Entry(safe_name(f"{student}-{participant}"), shown, keys, "", f"{where}: {shown}", tuple(found))
+        entry = Entry(safe_name(f"{student}-{participant}"), shown, keys, "", f"{where}: {shown}", tuple(taken))
         addresses = tuple(dict.fromkeys(pasted.get((student, participant), ())))
         made = _with_address(entry, addresses, "the submission has neither a file nor the address of a repository")
         if isinstance(made, Entry):

@@ -131,17 +131,27 @@ def keep(out: Path, name: str, data: bytes, known: Stamp) -> Result:
     return found
 
 
+def check_free(out: Path, name: str) -> None:
+    """See that nothing but an earlier result stands where the result *name* goes.
+
+    Raises:
+        UsageError: Something else does.
+    """
+    folder = out / name
+    if os.path.lexists(folder) and not (folder / STAMP).exists() and not (folder / pipeline.EVIDENCE).is_dir():
+        raise UsageError(f"{folder} is in the way and no result of this grader. Move it, or give another --out.")
+
+
 def discard(out: Path, name: str) -> None:
     """Remove the result *name*, at once as far as anybody can see; a folder that is no result is left alone.
 
     Raises:
         UsageError: Something else of that name is in the way.
     """
+    check_free(out, name)
     folder = out / name
     if not os.path.lexists(folder):
         return
-    if not (folder / STAMP).exists() and not (folder / pipeline.EVIDENCE).is_dir():
-        raise UsageError(f"{folder} is in the way and no result of this grader. Move it, or give another --out.")
     old = out / INCOMING / f"{name}.old"
     shutil.rmtree(old, ignore_errors=True)
     old.parent.mkdir(exist_ok=True)

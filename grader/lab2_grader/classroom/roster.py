@@ -14,8 +14,8 @@ from lab2_grader.text import clean
 _COLUMNS = {
     "address": ("repository", "repo", "url", "address", "repositoryurl", "repourl", "studentrepositoryurl", "giturl",
                 "github", "githuburl", "githubrepository", "repositoryaddress", "clone", "cloneurl", "link"),
-    "student": ("student", "username", "user", "login", "name", "fullname", "studentname", "identifier",
-                "rosteridentifier", "githubusername", "id", "studentid", "email", "emailaddress"),
+    "student": ("username", "user", "login", "studentid", "id", "identifier", "rosteridentifier", "githubusername",
+                "student", "studentname", "name", "fullname", "email", "emailaddress"),
     "commit": ("commit", "sha", "revision", "commitid"),
     "before": ("deadline", "before", "due", "duedate"),
 }  # fmt: skip

@@ -16,7 +16,7 @@ from lab2_grader import process, submission
 from lab2_grader.classroom import inbox, pool, results, summary, work
 from lab2_grader.classroom.cluster import Cluster
 from lab2_grader.classroom.pool import StoppedError
-from lab2_grader.classroom.records import Entry, Graded, Stamp, Task
+from lab2_grader.classroom.records import Entry, Graded, Inbox, Stamp, Task
 from lab2_grader.errors import FaultError, RefusedError, UsageError
 from lab2_grader.lab import Rubric
 from lab2_grader.records import ClassLine, ClassState, ClassSummary, Clock, Record, Result, SubmissionFacts
@@ -84,7 +84,7 @@ def grade_class(order: Order, watch: Watcher) -> ClassSummary:
         if order.scheduler:
             cluster = Cluster(order.scheduler)
             try:
-                cluster.check(order.rubric, order.ros, isolation=order.isolation)
+                cluster.check(order.ros, isolation=order.isolation)
                 run = _Run(order, out, watch, cluster.perform, cluster.stop)
                 return run.all(found, order.jobs or cluster.lanes, None)
             finally:
@@ -109,7 +109,7 @@ class _Run:
         self._attempts: dict[str, int] = {}
         self._lanes: pool.Lanes[Entry, ClassLine]
 
-    def all(self, found: inbox.Inbox, lanes: int, gate: pool.Gate | None) -> ClassSummary:
+    def all(self, found: Inbox, lanes: int, gate: pool.Gate | None) -> ClassSummary:
         """Grade every entry, then those that were inconclusive once more and once more, alone."""
         self._unknown = found.unknown
         self._lines = {entry.name: _line(entry, ClassState.WAITING, "not graded yet") for entry in found.entries}
@@ -184,6 +184,7 @@ class _Run:
     def _graded(self, entry: Entry) -> tuple[ClassLine, bool]:
         """(the line of *entry*, whether it had been graded before)."""
         order, doing = self._order, self._doing(entry.name)
+        results.check_free(self._out, entry.name)
         doing("taking it over")
         with process.temporary_directory() as scratch:
             source = inbox.fetch(entry, scratch)

@@ -97,7 +97,7 @@ def unpack(data: bytes, folder: Path) -> None:
         archive.extractall(folder, filter="data")
 
 
-def perform(task: bytes, doing: Doing = lambda text: None) -> bytes:
+def perform(task: bytes, doing: Doing = lambda _: None) -> bytes:
     """Grade one submission.
 
     Args:

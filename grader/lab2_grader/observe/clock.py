@@ -88,9 +88,7 @@ class LockStep:
 
     def _heard(self) -> list[Message]:
         """The numbers so far; every message while there is no number, so that silence can be told from slowness."""
-        messages = self._observer.messages
-        numbers = [message for message in messages if message.topic == self._topic]
-        return numbers or messages
+        return self._observer.messages_on(self._topic) or self._observer.messages
 
     def _next_tick(self) -> bool:
         """Move the clock until the talker speaks; False when it is silent, has ended, or time is up."""

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import queue
 import re
 import secrets
+import threading
 import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import PurePosixPath
 from typing import Any
 
+import msgspec
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -37,9 +41,13 @@ from lab2_grader.text import clean
 
 HOUSEKEEPING_TOPICS = ("/rosout", "/parameter_events", "/clock")
 TYPE_NAME = re.compile(r"^([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)$")
+MOST_TYPES = 5  # of one topic that are listened to
 QUEUE_DEPTH = 1000  # the observer never loses what it could have heard
+GRAPH_SHARE = 5  # at most one part in so many of the observer's time goes into looking at the graph
 GRAPH_POLL_SECONDS = 0.02
 PROCESS_POLL_SECONDS = 0.1
+QUICK_PROCESS_POLL_SECONDS = 0.02  # until the first message: what dies at once must have been seen
+PROCESS_ID = slice(4, 6)  # of an identity of Fast DDS (GUID prefix): the low half of the process's own pid
 UNSUPPORTED = "[lab2-launcher] unsupported: "
 
 Handle = tuple[str, str, bool, bool]
@@ -58,6 +66,7 @@ class Observer:
     def __init__(self, recorder: Recorder) -> None:
         self.recorder = recorder
         self.messages: list[Message] = []
+        self._by_topic: dict[str, list[Message]] = {}
         self.lines: list[Line] = []
         self.endpoints: dict[str, Endpoint] = {}
         self._changed_at = 0.0
@@ -71,10 +80,16 @@ class Observer:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self._subscribed: set[Handle] = set()
+        self._types: dict[str, list[str]] = {}  # of each topic, in the order in which they were met
+        self._more_nodes: list[Node] = []
+        self._heard: queue.SimpleQueue[Message] = queue.SimpleQueue()
         self._output: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
         self._program: process.Process | None = None
         self._splitters: dict[str, OutputLines] = {}
         self._processes: dict[int, str] = {}
+        self._table: dict[int, process.ProcessInfo] = {}
+        self._kept: Counter[str] = Counter()
+        self._dropped: Counter[str] = Counter()
         self.ended_executables: frozenset[str] = frozenset()
         self._next_graph = 0.0
         self._next_processes = 0.0
@@ -121,8 +136,9 @@ class Observer:
         by = outcome.ended_by
         self.ended = ProgramEnded(self.recorder.now(), outcome.code, outcome.signal, by, outcome.limit)
         self.recorder.write(self.ended)
-        if outcome.dropped_bytes:
-            self.recorder.write(Measured(self.recorder.now(), "dropped_bytes", outcome.dropped_bytes))
+        for what, count in (("dropped_bytes", outcome.dropped_bytes), *self._dropped.items()):
+            if count:
+                self.recorder.write(Measured(self.recorder.now(), what, count))
 
     def executables(self) -> frozenset[str]:
         """Names of the package's executables that are running now."""
@@ -132,22 +148,39 @@ class Observer:
         if self._program is None:
             return
         found = {info.pid: info for info in process.tree(self._program.pid)} if self._program.running else {}
-        if found and process.busy(self._program.pid):
+        self._table = found
+        if process.busy(found):
             self._changed_at = self.recorder.now()
         marker = f"/lib/{lab.specification().package}/"
         for pid, info in found.items():
-            if pid not in self._processes:
+            if not self._processes.get(pid):  # one that was seen before its exec has the name of its parent yet
                 script = next((part for part in info.command[:2] if marker in part), "")
                 executable = PurePosixPath(script).name if script else ""
                 self._processes[pid] = executable
                 if executable:
                     command = clean(" ".join(info.command), 500)
                     self.recorder.write(ProcessSeen(self.recorder.now(), pid, clean(executable, 100), command))
-        for pid in [pid for pid in self._processes if pid not in found]:
+        for pid in [pid for pid in self._processes if pid not in found and not process.alive(pid)]:
             if executable := self._processes.pop(pid):
                 self.ended_executables |= {executable}
                 by = EndedBy.GRADER if self._stopping else EndedBy.ITSELF
                 self.recorder.write(ProcessGone(self.recorder.now(), pid, by))
+
+    def _program_of(self, gid: str) -> str:
+        """Which executable of the package the endpoint *gid* belongs to, as `Endpoint.program` has it."""
+        number = int.from_bytes(bytes.fromhex(gid)[PROCESS_ID], "little")
+        if all(info.inside_pid & 0xFFFF != number for info in self._table.values()):
+            self._look_at_processes()
+        owners = {self._executable_of(pid) for pid, info in self._table.items() if info.inside_pid & 0xFFFF == number}
+        return owners.pop() if len(owners) == 1 else ""
+
+    def _executable_of(self, pid: int) -> str:
+        """The executable that *pid* is, or descends from; `-` when there is none."""
+        while pid in self._table:
+            if name := self._processes.get(pid):
+                return name
+            pid = self._table[pid].parent
+        return "-"
 
     # --- what it prints ---------------------------------------------------------------------
 
@@ -167,8 +200,17 @@ class Observer:
         for line in lines:
             if line.text.startswith(UNSUPPORTED) and line.source == "launch":
                 self.recorder.write(Unsupported(line.at, line.text[len(UNSUPPORTED) :]))
-            self.lines.append(line)
-            self.recorder.write(line)
+            if self._keeps("lines", "dropped_lines", lab.limits().resources.lines):
+                self.lines.append(line)
+                self.recorder.write(line)
+
+    def _keeps(self, what: str, dropped: str, limit: int) -> bool:
+        """Whether one more of *what* is kept: whoever floods us shall not fill our memory and our disk."""
+        self._kept[what] += 1
+        if self._kept[what] > limit:
+            self._dropped[dropped] += 1
+            return False
+        return True
 
     # --- the graph --------------------------------------------------------------------------
 
@@ -193,9 +235,7 @@ class Observer:
             self._nodes = nodes
             self._changed_at = now
         found: dict[str, Endpoint] = {}
-        for topic, _ in self.node.get_topic_names_and_types():
-            if topic in HOUSEKEEPING_TOPICS[:2]:
-                continue
+        for topic in self._topics():
             publishers = self.node.get_publishers_info_by_topic(topic)
             subscriptions = self.node.get_subscriptions_info_by_topic(topic) if topic != "/clock" else []
             for kind, infos in (("publisher", publishers), ("subscription", subscriptions)):
@@ -213,10 +253,17 @@ class Observer:
                     self.listen(endpoint.topic, endpoint.type, reliable, lasting)
         for gid in self.endpoints.keys() - found.keys():
             gone = self.endpoints[gid]
-            fields = (gone.kind, gid, gone.node, gone.topic, gone.type, gone.reliability, gone.durability)
-            self.recorder.write(Endpoint(now, "gone", *fields))
+            self.recorder.write(msgspec.structs.replace(gone, at=now, event="gone"))
             self._changed_at = now
         self.endpoints = found
+
+    def _topics(self) -> list[str]:
+        """The topics there are, the lab's own first, and no more of the others than are looked at in a scene."""
+        specification = lab.specification()
+        own = (specification.number_topic.name, specification.text_topic.name, "/clock")
+        found = {topic for topic, _ in self.node.get_topic_names_and_types()} - set(HOUSEKEEPING_TOPICS[:2])
+        ordered = [topic for topic in own if topic in found] + sorted(found.difference(own))
+        return ordered[: lab.limits().resources.topics]
 
     def _endpoint(self, now: float, kind: str, gid: str, topic: str, info: Any) -> Endpoint:
         qos = info.qos_profile
@@ -232,6 +279,7 @@ class Observer:
             type=clean(info.topic_type, 200),
             reliability="reliable" if reliable else "best-effort",
             durability="transient-local" if lasting else "volatile",
+            program=self._program_of(gid),
         )
 
     def listen(self, topic: str, type_name: str, reliable: bool = True, lasting: bool = False) -> None:
@@ -239,7 +287,8 @@ class Observer:
         # A reliable publisher is heard by the same subscription whether or not it keeps old messages for late comers.
         handle = (topic, type_name, reliable, False if reliable else lasting)
         message_type = message_class(type_name)
-        if handle in self._subscribed or message_type is None:
+        known = self._types.get(topic, [])
+        if handle in self._subscribed or message_type is None or (len(known) >= MOST_TYPES and type_name not in known):
             return
         self._subscribed.add(handle)
         qos = QoSProfile(
@@ -252,11 +301,40 @@ class Observer:
             data = getattr(message, "data", None)
             kept = clean(data, 1000) if isinstance(data, str) else data if isinstance(data, int | float) else None
             number = int(info["publication_sequence_number"] or 0)
-            row = Message(self.recorder.now(), topic, type_name, number, kept)
-            self.messages.append(row)
-            self.recorder.write(row)
+            self._heard.put(Message(self.recorder.now(), topic, type_name, number, kept))
+            self._executor.wake()
 
-        self.node.create_subscription(message_type, topic, heard, qos)
+        # A name that rclpy does not accept was not made with rclpy: nothing that is asked for is heard there.
+        with contextlib.suppress(ValueError, RuntimeError):
+            self._node_for(topic, type_name).create_subscription(message_type, topic, heard, qos)
+
+    def _node_for(self, topic: str, type_name: str) -> Node:
+        """The node that subscribes to *topic* as that type.
+
+        One participant of the middleware cannot know one topic under two types, so each further type of a topic needs
+        a participant of its own, which spins in a thread of its own.
+        """
+        types = self._types.setdefault(topic, [])
+        if type_name not in types:
+            types.append(type_name)
+        rank = types.index(type_name)
+        while len(self._more_nodes) < rank:
+            context = Context()
+            rclpy.init(args=["--ros-args", "--disable-external-lib-logs"], context=context)
+            node = Node(self.name, context=context, enable_rosout=False, start_parameter_services=False)
+            executor = SingleThreadedExecutor(context=context)
+            executor.add_node(node)
+            threading.Thread(target=executor.spin, name=self.name, daemon=True).start()
+            self._more_nodes.append(node)
+        return self._more_nodes[rank - 1] if rank else self.node
+
+    def _drain_heard(self) -> None:
+        while not self._heard.empty():
+            row = self._heard.get()
+            if self._keeps(row.topic, "dropped_messages", lab.limits().resources.messages):
+                self.messages.append(row)
+                self._by_topic.setdefault(row.topic, []).append(row)
+                self.recorder.write(row)
 
     def publisher(self, topic: str, type_name: str) -> Publisher[Any]:
         """A publisher of the observer's own, with the default quality of service."""
@@ -264,20 +342,26 @@ class Observer:
         assert message_type is not None, type_name
         return self.node.create_publisher(message_type, topic, 10)
 
+    def messages_on(self, topic: str) -> list[Message]:
+        """The messages that came on *topic*."""
+        return self._by_topic.get(topic, [])
+
     # --- waiting ----------------------------------------------------------------------------
 
     def spin(self, seconds: float) -> None:
         """Let at most one thing happen, waiting no longer than *seconds*; look around when it is time to."""
         self._executor.spin_once(timeout_sec=seconds)
+        self._drain_heard()
         self._drain_output()
         now = time.monotonic()
         if now >= self._next_graph:
             self.look_at_graph()
-            self._next_graph = now + GRAPH_POLL_SECONDS * (1 if not self.messages else 10)
+            took = time.monotonic() - now
+            self._next_graph = now + max(GRAPH_SHARE * took, GRAPH_POLL_SECONDS * (1 if not self.messages else 10))
         if now >= self._next_processes:
             self._look_at_processes()
             self.recorder.flush()
-            self._next_processes = now + PROCESS_POLL_SECONDS
+            self._next_processes = now + (PROCESS_POLL_SECONDS if self.messages else QUICK_PROCESS_POLL_SECONDS)
 
     def until(self, condition: Callable[[], bool], seconds: float) -> bool:
         """Wait until *condition* holds, for at most *seconds*; whether it does."""

@@ -81,7 +81,7 @@ class _Ear:
         lines = self._observer.lines
 
         def heard() -> bool:
-            return any(line.source == self._source and fits(line.text) for line in lines[since:])
+            return any(line.source in (self._source, "ros2") and fits(line.text) for line in lines[since:])
 
         patience = seconds or (self._seconds if self._misses < PATIENCE else BRIEF_SECONDS)
         if not self._observer.until(heard, min(patience, PARTIAL_LINE_SECONDS)):
@@ -242,7 +242,7 @@ def _originals(observer: Observer, plan: ScenePlan) -> None:
     def enough() -> bool:
         heard = [str(message.data) for message in observer.messages if message.topic == topic.name]
         printed = [line.text for line in observer.lines if line.source == plan.listener]
-        answered = sum(any(text in line for line in printed) for text in set(heard))
+        answered = sum(any(text in line for line in printed) for text in set(heard[:RECENT]))
         return answered >= limits.messages
 
     observer.until(lambda: enough() or not observer.alive(), limits.seconds)

@@ -107,5 +107,6 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.globals |= {name: Markup((TEMPLATES / f"class.{name}").read_text()) for name in ("css", "js")}
+    own = {name: (TEMPLATES / f"class.{name}").read_text() for name in ("css", "js")}
+    environment.globals |= {name: Markup(text) for name, text in own.items()}  # noqa: S704 - files of ours
     return environment

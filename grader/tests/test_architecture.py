@@ -1,0 +1,160 @@
+"""The one-way flow of the design, held by walking the imports and the syntax of the package."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import types
+import typing
+from collections.abc import Iterator
+from enum import Enum
+from pathlib import Path
+
+import msgspec
+import pytest
+
+import lab2_grader
+from lab2_grader import records
+
+PACKAGE = Path(lab2_grader.__file__).parent
+LAUNCHER = PACKAGE / "ros" / "launcher"  # a program of its own, run inside the sandbox
+
+# From the top down: a module imports only from those above it, or from its own group.
+LAYERS = (
+    ("records", "errors", "text", "reading", "near"),
+    ("lab", "sections"),
+    ("messages", "stand_in"),
+    ("process", "cgroup"),
+    ("sandbox",),
+    ("ros",),
+    ("submission",),
+    ("build",),
+    ("observe",),
+    ("evidence",),
+    ("stage",),
+    ("checks",),
+    ("score",),
+    ("report",),
+    ("pipeline",),
+    ("classroom", "gradebook", "doctor"),
+    ("cli", "__main__"),
+)
+LEVEL = {name: level for level, layer in enumerate(LAYERS) for name in layer}
+PURE = ("checks", "score", "report", "near", "reading", "stand_in", "records", "text")
+
+
+def modules() -> Iterator[tuple[str, ast.Module]]:
+    """Every module of the package (`checks/talker.py`, …) and its tree, without the launcher."""
+    for path in sorted(PACKAGE.rglob("*.py")):
+        if not path.is_relative_to(LAUNCHER):
+            yield str(path.relative_to(PACKAGE)), ast.parse(path.read_text())
+
+
+MODULES = dict(modules())
+
+
+def layer(name: str) -> str:
+    """The part of the package that the module at *name* belongs to."""
+    return name.removesuffix(".py").split("/")[0]
+
+
+def imported(tree: ast.Module) -> Iterator[tuple[str, str]]:
+    """(module, name) of every import, wherever it stands; the name is empty for a plain import."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, "") for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports are absolute"
+            yield from ((node.module or "", alias.name) for alias in node.names)
+
+
+def own_imports(tree: ast.Module) -> Iterator[str]:
+    """The parts of this package that a module imports."""
+    for module, name in imported(tree):
+        if module == "lab2_grader":
+            yield name
+        elif module.startswith("lab2_grader."):
+            yield module.split(".")[1]
+
+
+def external_imports(tree: ast.Module) -> set[str]:
+    return {module.split(".")[0] for module, _ in imported(tree)}
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_imports_go_up_only(name: str) -> None:
+    if name in ("__init__.py", "ros/time_lapse_launch.py"):
+        return
+    here = layer(name)
+    assert here in LEVEL, f"{name} has no place in the order of modules"
+    for other in own_imports(MODULES[name]):
+        if other in LEVEL:
+            assert other == here or LEVEL[other] < LEVEL[here] or other in LAYERS[LEVEL[here]], (
+                f"{name} imports {other}"
+            )
+
+
+@pytest.mark.parametrize("name", [name for name in MODULES if layer(name) in PURE])
+def test_right_of_the_evidence_nothing_happens(name: str) -> None:
+    forbidden = {"rclpy", "subprocess", "socket", "threading", "tempfile", "time", "random", "signal"}
+    assert not external_imports(MODULES[name]) & forbidden
+    assert "process" not in set(own_imports(MODULES[name]))
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_only_process_starts_processes(name: str) -> None:
+    if name == "process.py":
+        return
+    assert "subprocess" not in external_imports(MODULES[name])
+    spawners = {"system", "popen", "fork", "forkpty", "posix_spawn", "posix_spawnp", "startfile"}
+    for node in ast.walk(MODULES[name]):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "os":
+            assert node.attr not in spawners and not node.attr.startswith(("exec", "spawn")), f"{name}: os.{node.attr}"
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_only_the_command_line_prints(name: str) -> None:
+    if layer(name) in ("cli", "__main__"):
+        return
+    for node in ast.walk(MODULES[name]):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            assert node.func.id != "print", f"{name}, line {node.lineno}"
+    assert ("rich.console", "Console") not in set(imported(MODULES[name]))
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_only_the_observer_imports_rclpy(name: str) -> None:
+    if layer(name) != "observe":
+        assert not external_imports(MODULES[name]) & {"rclpy", "std_msgs", "rosgraph_msgs"}
+
+
+# --- records ----------------------------------------------------------------------------------------
+
+RECORDS = [
+    kind
+    for _, kind in inspect.getmembers(records, inspect.isclass)
+    if issubclass(kind, msgspec.Struct) and kind.__module__ == records.__name__
+]
+
+
+def parts(annotation: object) -> Iterator[object]:
+    """*annotation* and what stands in its brackets."""
+    origin = typing.get_origin(annotation)
+    if origin not in (types.UnionType, typing.Union):
+        yield origin or annotation
+    for argument in typing.get_args(annotation):
+        yield from parts(argument)
+
+
+@pytest.mark.parametrize("kind", RECORDS)
+def test_records_are_frozen_through_and_through(kind: type[msgspec.Struct]) -> None:
+    assert kind.__struct_config__.frozen
+    for name, annotation in typing.get_type_hints(kind).items():
+        if name.startswith("__"):
+            continue
+        for part in parts(annotation):
+            assert part not in (list, dict, set, bytearray), f"{kind.__name__}.{name}"
+            if isinstance(part, type) and issubclass(part, msgspec.Struct):
+                assert part in RECORDS
+            elif isinstance(part, type):
+                assert issubclass(part, Enum) or part in (int, float, str, bytes, bool, tuple, type(None))

@@ -1,0 +1,94 @@
+"""The catalogue of sentences: every one is used, none is written elsewhere, and all placeholders are filled."""
+
+from __future__ import annotations
+
+import ast
+import re
+import string
+from pathlib import Path
+
+import msgspec
+import pytest
+import zoo_builder
+from test_judging import BY_HAND
+
+import lab2_grader
+from lab2_grader import lab, messages
+from lab2_grader.checks.verdicts import known
+
+PACKAGE = Path(lab2_grader.__file__).parent
+CATALOGUE = messages.catalogue()
+FAULTS = [(check, key) for check, texts in CATALOGUE.check.items() for key in texts.fault]
+
+
+def test_every_check_of_the_rubric_has_words_and_no_other() -> None:
+    assert set(CATALOGUE.check) == {check.id for check in lab.rubric().check} == set(zoo_builder.CHECKS)
+
+
+def test_every_fault_is_shown_by_an_animal_or_by_hand() -> None:
+    animals = [*zoo_builder.animals().values(), *zoo_builder.repositories().values()]
+    shown = {(check, key) for animal in animals for check, (key, _) in animal.fails.items()}
+    assert shown | set(BY_HAND) == set(FAULTS)
+    assert not shown & set(BY_HAND), "what an animal shows needs no evidence made by hand"
+
+
+@pytest.mark.parametrize("table", ["status", "note", "phrase"])
+def test_every_other_sentence_is_used(table: str) -> None:
+    sources = "\n".join(path.read_text() for path in PACKAGE.rglob("*.py"))
+    unused = [key for key in getattr(CATALOGUE, table) if f'"{key}"' not in sources]
+    assert not unused
+
+
+@pytest.mark.parametrize(("check", "key"), FAULTS)
+def test_words_are_complete(check: str, key: str) -> None:
+    fault, texts = CATALOGUE.check[check].fault[key], CATALOGUE.check[check]
+    assert fault.observed and fault.hint and texts.expected and texts.judged and texts.ruling
+    for text in (texts.expected, texts.judged, texts.ruling):
+        assert "{" not in messages.fill(text, **known(check))
+    for sentence in (fault.hint, texts.judged, texts.ruling):
+        assert sentence[0].isupper() or sentence.startswith(("self.", "setup.cfg", "print()", "colcon"))
+        assert sentence.rstrip("\"`'").endswith((".", ")", "`", "?", '"')) or "git" in sentence
+
+
+def test_placeholders_are_names() -> None:
+    for check, key in FAULTS:
+        fault = CATALOGUE.check[check].fault[key]
+        for text in (fault.observed, fault.hint):
+            for _, name, _, _ in string.Formatter().parse(text):
+                assert name is None or name.isidentifier(), f"{check}.{key}: {name}"
+
+
+def test_symptoms_are_rows_of_the_troubleshooting_table() -> None:
+    rows = {row["id"] for row in msgspec.toml.decode((lab.FACTS / "symptoms.toml").read_bytes())["symptom"]}
+    named = {CATALOGUE.check[check].fault[key].symptom for check, key in FAULTS} - {""}
+    assert named and named <= rows
+
+
+def test_nothing_promises_an_exception_that_jazzy_does_not_raise() -> None:
+    overflow = CATALOGUE.check["talker-wrap"].fault["overflow"]
+    assert "says nothing" in overflow.hint
+    assert not re.search(r"exception|raises", overflow.hint + overflow.observed)
+
+
+@pytest.mark.parametrize(
+    "path", [*sorted(PACKAGE.glob("checks/*.py")), PACKAGE / "score.py", PACKAGE / "near.py"], ids=lambda p: p.stem
+)
+def test_no_sentence_is_written_elsewhere(path: Path) -> None:
+    tree = ast.parse(path.read_text())
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    docstrings = {
+        id(n.body[0].value) for n in ast.walk(tree) if isinstance(n, documented) and isinstance(n.body[0], ast.Expr)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings:
+            assert not re.search(r"[a-z] [a-z]+ [a-z]", node.value) or node.value in ROBOTS, (
+                f"{path.name}: {node.value!r}"
+            )
+
+
+# What programs say, by which their faults are known.
+ROBOTS = (
+    "Traceback (most recent call last):",
+    r"executable '([^']*)' not found on the libexec directory",
+    "' has no attribute '",
+)

@@ -1,0 +1,219 @@
+"""Checks on recorded evidence, as it is and with one thing changed: no ROS, no processes, no time."""
+
+from __future__ import annotations
+
+import tarfile
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import pytest
+import zoo_builder
+from record_evidence import DATA, RECORDED
+from zoo_runner import complaints
+
+from lab2_grader import checks, evidence, lab, score
+from lab2_grader.records import (
+    EndedBy,
+    Event,
+    Evidence,
+    Line,
+    Measured,
+    Message,
+    Phase,
+    Scene,
+    SceneName,
+    Status,
+    Unsupported,
+    Verdict,
+)
+
+
+def recorded(name: str, folder: Path) -> Evidence:
+    """The recorded evidence of an animal, unpacked below *folder*."""
+    target = folder / name
+    if not target.exists():
+        with tarfile.open(DATA / f"{name}.tar.xz") as archive:
+            archive.extractall(target, filter="data")
+    return evidence.read(target)
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("evidence")
+
+
+@pytest.fixture(scope="session")
+def solution(folder: Path) -> Evidence:
+    return recorded("solution", folder)
+
+
+def verdicts(observed: Evidence) -> dict[str, Verdict]:
+    return {verdict.check: verdict for verdict in checks.judge(observed)}
+
+
+def with_build(observed: Evidence, **changes: object) -> Evidence:
+    assert observed.build is not None
+    build = msgspec.structs.replace(observed.build, **changes)
+    return msgspec.structs.replace(observed, build=build, scenes=())
+
+
+def with_scene(observed: Evidence, name: SceneName, change: Callable[[Scene], Scene | None]) -> Evidence:
+    changed = [change(scene) if scene.name is name else scene for scene in observed.scenes]
+    return msgspec.structs.replace(observed, scenes=tuple(scene for scene in changed if scene is not None))
+
+
+def with_events(observed: Evidence, name: SceneName, keep: Callable[[Event], Event | None]) -> Evidence:
+    def change(scene: Scene) -> Scene:
+        return msgspec.structs.replace(
+            scene, events=tuple(e for event in scene.events if (e := keep(event)) is not None)
+        )
+
+    return with_scene(observed, name, change)
+
+
+# --- as recorded --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_recorded_evidence_is_judged_as_its_animal(name: str, folder: Path) -> None:
+    observed = recorded(name, folder)
+    assert not complaints(zoo_builder.animals()[name], checks.judge(observed))
+    assert checks.judge(observed) == checks.judge(recorded(name, folder))
+    packed = (DATA / f"{name}.tar.xz").stat().st_size
+    assert packed < 100_000
+
+
+def test_every_lost_point_has_words(folder: Path) -> None:
+    for name in RECORDED:
+        for verdict in checks.judge(recorded(name, folder)):
+            assert verdict.expected
+            if verdict.status not in (Status.PASS, Status.NOT_ASSESSED):
+                assert verdict.observed
+                assert verdict.hint or verdict.status is not Status.FAIL
+                assert "{" not in verdict.observed + verdict.hint or verdict.message in ("silent", "no-f-string")
+
+
+# --- faults that no animal shows ------------------------------------------------------------------------
+
+BY_HAND: dict[tuple[str, str], dict[str, object]] = {
+    ("package-builds", "time"): {"ok": False, "code": None, "ended_by": EndedBy.DEADLINE, "seconds": 120.0},
+    ("package-builds", "limit"): {"ok": False, "code": None, "ended_by": EndedBy.LIMIT, "limit": "memory"},
+    ("package-builds", "nothing-installed"): {"ok": False, "code": 0, "executables": (), "modules": ()},
+}
+
+
+@pytest.mark.parametrize(("check", "key"), BY_HAND)
+def test_builds_that_no_animal_waits_for(check: str, key: str, solution: Evidence) -> None:
+    found = verdicts(with_build(solution, **BY_HAND[check, key]))
+    assert (found[check].status, found[check].message) == (Status.FAIL, key)
+    others = {found[name].status for name in zoo_builder.CHECKS if name != check and not name.startswith("git")}
+    assert others == {Status.BLOCKED}
+    assert all(v.because == ("package-builds",) for v in found.values() if v.status is Status.BLOCKED)
+
+
+# --- whose fault it is ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", list(SceneName))
+def test_a_fault_of_ours_in_a_scene_withholds_the_mark(name: SceneName, solution: Evidence) -> None:
+    if solution.scene(name) is None:
+        return
+    faulty = with_scene(solution, name, lambda scene: msgspec.structs.replace(scene, complete=False, fault="It broke."))
+    found = checks.judge(faulty)
+    assert Status.INCONCLUSIVE in {verdict.status for verdict in found}
+    assert Status.FAIL not in {verdict.status for verdict in found}
+    result = score.score(faulty, found, lab.rubric(), "")
+    assert (result.graded, result.score) == (False, None)
+    assert any("not the student's fault" in note for note in result.notes)
+
+
+def test_a_fault_of_ours_before_the_build_withholds_the_mark(solution: Evidence) -> None:
+    found = verdicts(msgspec.structs.replace(solution, build=None, scenes=(), faults=("No colcon.",)))
+    assert {v.status for n, v in found.items() if not n.startswith("git")} == {Status.INCONCLUSIVE}
+
+
+def test_what_our_launcher_does_not_know_is_ours(solution: Evidence) -> None:
+    def unknown(scene: Scene) -> Scene:
+        kept = tuple(event for event in scene.events if isinstance(event, Phase))
+        return msgspec.structs.replace(scene, events=(*kept, Unsupported(1.0, "launch.actions.Frobnicate")))
+
+    found = verdicts(with_scene(solution, SceneName.CONVERSATION, unknown))
+    for name in ("launch-starts", "launch-only-numeric", "launch-conversation"):
+        assert found[name].status is Status.INCONCLUSIVE, name
+        assert "Frobnicate" in found[name].observed
+
+
+def test_too_slow_to_wrap_is_not_the_talker_s_fault(solution: Evidence) -> None:
+    scene = solution.scene(SceneName.CONVERSATION)
+    assert scene is not None
+    last = max(e.at for e in scene.events if isinstance(e, Message) and e.topic == "/numeric_chatter" and e.data == 100)
+
+    def until_then(event: Event) -> Event | None:
+        if isinstance(event, Phase) and event.name == "stop":
+            return Phase(last + 0.1, "stop")
+        return event if event.at <= last and not (isinstance(event, Message) and event.number > 101) else None
+
+    found = verdicts(with_events(solution, SceneName.CONVERSATION, until_then))
+    assert found["talker-wrap"].status is Status.INCONCLUSIVE
+    assert found["talker-step"].status is Status.PASS
+
+
+@pytest.mark.parametrize("missed", [1, 5, 40])
+def test_messages_lost_before_discovery_cost_nothing(missed: int, solution: Evidence) -> None:
+    def lost(event: Event) -> Event | None:
+        return None if isinstance(event, Message) and event.number <= missed else event
+
+    found = verdicts(with_events(solution, SceneName.CONVERSATION, lost))
+    for name in ("talker-start", "talker-step", "talker-wrap", "talker-chatter"):
+        assert found[name].status is Status.PASS, found[name]
+
+
+def test_lines_and_messages_may_come_in_any_order(solution: Evidence) -> None:
+    """A slow observer reads what was printed before it takes in what was published, or long after."""
+    for shift in (-3.0, 3.0):
+
+        def moved(event: Event, shift: float = shift) -> Event:
+            return msgspec.structs.replace(event, at=event.at + shift) if isinstance(event, Line) else event
+
+        found = verdicts(with_events(solution, SceneName.CONVERSATION, moved))
+        assert found["launch-conversation"].status is Status.PASS
+
+
+# --- independence -----------------------------------------------------------------------------------------
+
+
+def test_without_its_scene_a_check_blames_what_is_missing(solution: Evidence) -> None:
+    found = verdicts(with_scene(solution, SceneName.ORIGINALS, lambda scene: None))
+    assert found["originals-kept"].message == "no-launch"
+    assert {v.status for n, v in found.items() if n != "originals-kept" and not n.startswith("git")} == {Status.PASS}
+
+
+def test_a_listener_that_prints_other_numbers_besides_passes(solution: Evidence) -> None:
+    def wordy(event: Event) -> Event:
+        return (
+            msgspec.structs.replace(event, text=f"{event.text} (of 127, message 7)")
+            if isinstance(event, Line)
+            else event
+        )
+
+    assert verdicts(with_events(solution, SceneName.LISTENER, wordy))["listener-numeric"].status is Status.PASS
+
+
+def test_a_text_in_the_place_of_the_number_does_not_pass(solution: Evidence) -> None:
+    def mute(event: Event) -> Event | None:
+        return None if isinstance(event, Line) and "number" in event.text else event
+
+    found = verdicts(with_events(solution, SceneName.LISTENER, mute))
+    assert (found["listener-numeric"].status, found["listener-numeric"].message) == (Status.FAIL, "silent")
+    assert found["listener-chatter"].status is Status.PASS
+
+
+def test_the_period_is_a_note_and_no_verdict(solution: Evidence) -> None:
+    def slow(event: Event) -> Event:
+        return msgspec.structs.replace(event, value=7.5) if isinstance(event, Measured) else event
+
+    result = score.score(solution, checks.judge(solution), lab.rubric(), "")
+    other = with_events(solution, SceneName.CONVERSATION, slow)
+    assert score.score(other, checks.judge(other), lab.rubric(), "").score == result.score
+    assert any("0.5 s" in note for note in result.notes)
