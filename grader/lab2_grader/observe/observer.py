@@ -156,6 +156,8 @@ class Observer:
             if not self._processes.get(pid):  # one that was seen before its exec has the name of its parent yet
                 script = next((part for part in info.command[:2] if marker in part), "")
                 executable = PurePosixPath(script).name if script else ""
+                if executable and self._processes.get(info.parent) == executable:
+                    executable = ""  # a child of a node that has not become another program yet, or never will
                 self._processes[pid] = executable
                 if executable:
                     command = clean(" ".join(info.command), 500)
