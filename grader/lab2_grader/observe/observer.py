@@ -156,6 +156,8 @@ class Observer:
             if not self._processes.get(pid):  # one that was seen before its exec has the name of its parent yet
                 script = next((part for part in info.command[:2] if marker in part), "")
                 executable = PurePosixPath(script).name if script else ""
+                if executable and self._processes.get(info.parent) == executable:
+                    executable = ""  # a child of a node that has not become another program yet, or never will
                 self._processes[pid] = executable
                 if executable:
                     command = clean(" ".join(info.command), 500)
@@ -169,9 +171,12 @@ class Observer:
     def _program_of(self, gid: str) -> str:
         """Which executable of the package the endpoint *gid* belongs to, as `Endpoint.program` has it."""
         number = int.from_bytes(bytes.fromhex(gid)[PROCESS_ID], "little")
-        if all(info.inside_pid & 0xFFFF != number for info in self._table.values()):
+        for _ in range(2):  # what was seen of the processes may be older than the endpoint
+            pids = [pid for pid, info in self._table.items() if info.inside_pid & 0xFFFF == number]
+            owners = {self._executable_of(pid) for pid in pids}
+            if len(owners) == 1 and "-" not in owners:
+                return owners.pop()
             self._look_at_processes()
-        owners = {self._executable_of(pid) for pid, info in self._table.items() if info.inside_pid & 0xFFFF == number}
         return owners.pop() if len(owners) == 1 else ""
 
     def _executable_of(self, pid: int) -> str:
