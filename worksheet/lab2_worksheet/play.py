@@ -80,8 +80,7 @@ def play(say: Callable[[str], None] = lambda text: None) -> Played:
             for key in ids:
                 terminal = terminals[running.pop(key)]
                 keep(commands()[key], terminal)
-                terminal.interrupt()
-                if not terminal.wait_ready(STOP_SECONDS):
+                if not terminal.interrupt(STOP_SECONDS):
                     wrong.append(f"{key}: did not stop within {STOP_SECONDS:g} s of Ctrl-C.")
 
         for command in commands().values():

@@ -73,9 +73,17 @@ class Terminal:
         """Type *line* and press Enter."""
         os.write(self._fd, line.encode() + b"\n")
 
-    def interrupt(self) -> None:
-        """Press Ctrl-C."""
-        os.write(self._fd, b"\x03")
+    def interrupt(self, seconds: float) -> bool:
+        """Press Ctrl-C, and again as a person would, until the prompt is back or *seconds* are over; whether it is back.
+
+        One Ctrl-C can be lost: what arrives while bash is still starting a program interrupts neither.
+        """
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            os.write(self._fd, b"\x03")
+            if self.wait_ready(min(5.0, seconds)):
+                return True
+        return False
 
     def read(self, seconds: float) -> None:
         """Take in what is printed, for at most *seconds*."""
