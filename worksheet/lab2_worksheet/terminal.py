@@ -74,7 +74,7 @@ class Terminal:
         os.write(self._fd, line.encode() + b"\n")
 
     def interrupt(self, seconds: float) -> bool:
-        """Press Ctrl-C, and again as a person would, until the prompt is back or *seconds* are over; whether it is back.
+        """Press Ctrl-C, and again as a person would, until the prompt is back or *seconds* are over; whether it is.
 
         One Ctrl-C can be lost: what arrives while bash is still starting a program interrupts neither.
         """
