@@ -98,7 +98,10 @@ def test_every_lost_point_has_words(folder: Path) -> None:
 
 BY_HAND: dict[tuple[str, str], dict[str, object]] = {
     ("package-builds", "time"): {"ok": False, "code": None, "ended_by": EndedBy.DEADLINE, "seconds": 120.0},
-    ("package-builds", "limit"): {"ok": False, "code": None, "ended_by": EndedBy.LIMIT, "limit": "memory"},
+    **{
+        ("package-builds", f"limit-{limit}"): {"ok": False, "code": None, "ended_by": EndedBy.LIMIT, "limit": limit}
+        for limit in ("processes", "memory", "cpu", "file", "disk", "install", "files")
+    },
     ("package-builds", "nothing-installed"): {"ok": False, "code": 0, "executables": (), "modules": ()},
 }
 

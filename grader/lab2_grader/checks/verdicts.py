@@ -80,15 +80,18 @@ def _expected(check: str) -> str:
 
 def explanation(check: lab.RubricCheck) -> str:
     """What *check* asks, how it is judged, what the ruling is where the worksheet is silent."""
-    texts = messages.catalogue().check[check.id]
-    values = known(check.id)
-    return "\n".join(
-        (
-            f"{check.id}: {check.title}",
-            f"Worksheet section {check.section}; {check.points} points by default.",
-            "",
-            f"Asks:   {messages.fill(texts.expected, **values)}",
-            f"Judged: {messages.fill(texts.judged, **values)}",
-            f"Ruling: {messages.fill(texts.ruling, **values)}",
+    texts, values = messages.catalogue().check[check.id], known(check.id)
+    asked, judged, ruling = (messages.fill(text, **values) for text in (texts.expected, texts.judged, texts.ruling))
+    return (
+        messages.catalogue()
+        .phrase["explanation"]
+        .format(
+            check=check.id,
+            title=check.title,
+            section=check.section,
+            points=check.points,
+            asked=asked,
+            judged=judged,
+            ruling=ruling,
         )
     )
