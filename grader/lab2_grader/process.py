@@ -87,11 +87,6 @@ def control_groups() -> cgroup.Base | None:
     return None
 
 
-def control_groups_if_known() -> cgroup.Base | None:
-    """What `control_groups` has found; None when nobody has asked it yet, so that no group was ever made."""
-    return control_groups() if control_groups.cache_info().currsize else None
-
-
 class ProcessInfo:
     """A line of the process table: `pid`, `parent` and `command` (its arguments).
 
@@ -345,8 +340,10 @@ class Process:
             self._kill_rest()
             self._popen.wait()
         finally:
-            self._tidy_up()
-            self._finished.set()
+            try:
+                self._tidy_up()
+            finally:
+                self._finished.set()
 
     def _tidy_up(self) -> None:
         with self._wake_lock:
@@ -360,8 +357,8 @@ class Process:
                     stream.close()
         if self._group is not None:
             self._group.remove()
-        if (base := control_groups_if_known()) is not None:
-            cgroup.sweep(base, f"{cgroup.PREFIX}{self._name}-")
+        if self._base is not None:
+            cgroup.sweep(self._base, f"{cgroup.PREFIX}{self._name}-")
 
     def _pump_all(self) -> None:
         assert self._popen.stdout is not None
