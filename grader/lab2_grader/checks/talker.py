@@ -45,8 +45,10 @@ def talker_type(view: View, earlier: Earlier) -> Verdict:
             key = "wrong-message"
         elif "has no setter" in error:
             key = "no-setter"
+        elif "incompatible type" in error:  # one process cannot know one topic under two types
+            key = "two-types"
         file, line = scene.place_of_error(view.talker_name, view.specification.package)
-        return failed(check, key, file, line, error=error, talker=view.talker_name)
+        return failed(check, key, file, line, error=error, found=error, talker=view.talker_name)
     if not publishers:
         return _elsewhere(view)
     types = {endpoint.type for endpoint in publishers}
@@ -194,7 +196,7 @@ def talker_chatter(view: View, earlier: Earlier) -> Verdict:
         if all(endpoint.reliability == "best-effort" for endpoint in publishers):
             return failed(check, "best-effort")
         return passed(check)
-    if earlier["talker-type"].message in ("died", "ended", "wrong-message", "no-setter"):
+    if earlier["talker-type"].message in ("died", "ended", "wrong-message", "no-setter", "two-types"):
         return blocked(check, "talker-type")
     if publishers and earlier["talker-start"].message == "silent":
         return blocked(check, "talker-start")
