@@ -35,8 +35,8 @@ def test_every_fault_is_shown_by_an_animal_or_by_hand() -> None:
 @pytest.mark.parametrize("table", ["status", "note", "phrase"])
 def test_every_other_sentence_is_used(table: str) -> None:
     sources = "\n".join(path.read_text() for path in PACKAGE.rglob("*.py"))
-    limits = {f"limit-{name}" for name in ("seconds", "processes", "memory", "cpu", "disk")}  # put together from parts
-    unused = [key for key in getattr(CATALOGUE, table) if f'"{key}"' not in sources and key not in limits]
+    # The limits are named by what was struck: f"limit-{…}".
+    unused = [k for k in getattr(CATALOGUE, table) if f'"{k}"' not in sources and not k.startswith("limit-")]
     assert not unused
 
 
@@ -82,9 +82,10 @@ def test_no_sentence_is_written_elsewhere(path: Path) -> None:
     }
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings:
-            assert not re.search(r"[a-z] [a-z]+ [a-z]", node.value) or node.value in ROBOTS, (
-                f"{path.name}: {node.value!r}"
-            )
+            sentence = (
+                re.search(r"[a-z] [a-z]+ [a-z]", node.value) and path.stem != "verdicts"
+            )  # `explain` is for staff
+            assert not sentence or node.value in ROBOTS, f"{path.name}: {node.value!r}"
 
 
 # What programs say, by which their faults are known.
@@ -92,7 +93,8 @@ ROBOTS = (
     "Traceback (most recent call last):",
     r"executable '([^']*)' not found on the libexec directory",
     "' has no attribute '",
-    "has no setter",
     "No space left on device",
     "File too large",
+    "has no setter",
+    "object cannot be interpreted as an integer",
 )

@@ -15,6 +15,7 @@ from zoo_runner import complaints
 from lab2_grader import checks, evidence, lab, score
 from lab2_grader.records import (
     EndedBy,
+    Endpoint,
     Event,
     Evidence,
     Line,
@@ -96,23 +97,35 @@ def test_every_lost_point_has_words(folder: Path) -> None:
 
 # --- faults that no animal shows ------------------------------------------------------------------------
 
-BY_HAND: dict[tuple[str, str], dict[str, object]] = {
+LIMITS = ("processes", "memory", "cpu", "file", "disk", "install", "files")
+BUILDS: dict[tuple[str, str], dict[str, object]] = {
     ("package-builds", "time"): {"ok": False, "code": None, "ended_by": EndedBy.DEADLINE, "seconds": 120.0},
-    **{
-        ("package-builds", f"limit-{limit}"): {"ok": False, "code": None, "ended_by": EndedBy.LIMIT, "limit": limit}
-        for limit in ("processes", "memory", "cpu", "file", "disk", "install", "files")
-    },
     ("package-builds", "nothing-installed"): {"ok": False, "code": 0, "executables": (), "modules": ()},
+} | {
+    ("package-builds", f"limit-{limit}"): {"ok": False, "code": None, "ended_by": EndedBy.LIMIT, "limit": limit}
+    for limit in LIMITS
 }
+BY_HAND = (*BUILDS, ("launch-conversation", "strangers"), ("originals-kept", "strangers"))
 
 
-@pytest.mark.parametrize(("check", "key"), BY_HAND)
+@pytest.mark.parametrize(("check", "key"), BUILDS)
 def test_builds_that_no_animal_waits_for(check: str, key: str, solution: Evidence) -> None:
-    found = verdicts(with_build(solution, **BY_HAND[check, key]))
+    found = verdicts(with_build(solution, **BUILDS[check, key]))
     assert (found[check].status, found[check].message) == (Status.FAIL, key)
     others = {found[name].status for name in zoo_builder.CHECKS if name != check and not name.startswith("git")}
     assert others == {Status.BLOCKED}
     assert all(v.because == ("package-builds",) for v in found.values() if v.status is Status.BLOCKED)
+
+
+@pytest.mark.parametrize(
+    ("check", "scene"), [("launch-conversation", SceneName.CONVERSATION), ("originals-kept", SceneName.ORIGINALS)]
+)
+def test_what_another_process_says_is_not_theirs(check: str, scene: SceneName, solution: Evidence) -> None:
+    def strange(event: Event) -> Event:
+        return msgspec.structs.replace(event, program="-") if isinstance(event, Endpoint) else event
+
+    found = verdicts(with_events(solution, scene, strange))
+    assert (found[check].status, found[check].message) == (Status.FAIL, "strangers")
 
 
 # --- whose fault it is ------------------------------------------------------------------------------------

@@ -13,6 +13,8 @@ from lab2_grader.records import SceneName, Status, Verdict
 
 Earlier = Mapping[str, Verdict]
 
+# What Python says when it cannot make the data an int: with the assertions of the message compiled in, and without.
+NOT_AN_INT = ("PyLong_Check(field)", "object cannot be interpreted as an integer")
 SILENT_SECONDS = 3.0  # no message for so long before the scene was stopped: it had stopped by itself
 
 
@@ -31,18 +33,22 @@ def talker_type(view: View, earlier: Earlier) -> Verdict:
     error = scene.error_of(view.talker_name)
     if died and not view.numbers and scene.scene.name is SceneName.CONVERSATION:
         return blocked(check, "entry-points")  # there was nothing else that could be run in its place
+    if died and len(view.numbers) <= 1 and scene.says(view.talker_name, *NOT_AN_INT):
+        # What cannot be made an Int8 aborts the process, or is published as a number that nobody meant.
+        file, line = scene.place_of_error(view.talker_name, view.specification.package)
+        return failed(check, "wrong-data", file, line, error=error, talker=view.talker_name)
     if died and not view.numbers:
         if scene.ended is not None and scene.ended.code == 0 and scene.scene.label:
             return failed(check, "ended", talker=view.talker_name)
         key = "died"
         if publishers and "TypeError" in error:
             key = "wrong-message"
-        elif publishers and "(field)" in error:  # the assertion of the message's conversion to C
-            key = "wrong-data"
         elif "has no setter" in error:
             key = "no-setter"
+        elif "incompatible type" in error:  # one process cannot know one topic under two types
+            key = "two-types"
         file, line = scene.place_of_error(view.talker_name, view.specification.package)
-        return failed(check, key, file, line, error=error, talker=view.talker_name)
+        return failed(check, key, file, line, error=error, found=error, talker=view.talker_name)
     if not publishers:
         return _elsewhere(view)
     types = {endpoint.type for endpoint in publishers}
@@ -90,9 +96,14 @@ def talker_step(view: View, earlier: Earlier) -> Verdict:
     check = "talker-step"
     if stop := _unheard(check, view, earlier):
         return stop
-    sequel = _sequel(view)
+    sequel, scene = _sequel(view), view.talking
+    assert scene is not None
     if sequel is None or not sequel.values:
         return blocked(check, "talker-start")
+    if len(sequel.values) == 1 and scene.ended_by_itself(view.talker_name):
+        file, line = scene.place_of_error(view.talker_name, view.specification.package)
+        error = scene.error_of(view.talker_name)
+        return failed(check, "died", file, line, error=error, shown=str(sequel.values[0]), talker=view.talker_name)
     if len(sequel.values) == 1:
         return failed(check, "once", shown=str(sequel.values[0]))
     irregular = sequel.irregular
@@ -185,7 +196,7 @@ def talker_chatter(view: View, earlier: Earlier) -> Verdict:
         if all(endpoint.reliability == "best-effort" for endpoint in publishers):
             return failed(check, "best-effort")
         return passed(check)
-    if earlier["talker-type"].message in ("died", "ended", "wrong-message"):
+    if earlier["talker-type"].message in ("died", "ended", "wrong-message", "no-setter", "two-types"):
         return blocked(check, "talker-type")
     if publishers and earlier["talker-start"].message == "silent":
         return blocked(check, "talker-start")
@@ -210,7 +221,7 @@ def _unheard(check: str, view: View, earlier: Earlier) -> Verdict | None:
     base = earlier["talker-type"]
     if base.status is Status.INCONCLUSIVE:
         return inconclusive(check, "inconclusive-scene", fault=view.talking.scene.fault if view.talking else "")
-    if view.numbers:
+    if view.numbers and base.message != "wrong-data":
         return None
     if base.status in (Status.FAIL, Status.BLOCKED):
         return blocked(check, *(base.because or ("talker-type",)))

@@ -112,8 +112,8 @@ class SceneView:
 
     def ended_by_itself(self, executable: str) -> bool:
         """Whether *executable* was running, or was started, and ended before the grader stopped the scene."""
-        if self.scene.label:
-            return self.ended is not None and self.ended.by is not EndedBy.GRADER
+        if self.scene.label and self.ended is not None and self.ended.by is not EndedBy.GRADER:
+            return True
         pids = {process.pid for process in self.seen if process.executable == executable}
         if any(gone.pid in pids and gone.by is EndedBy.ITSELF for gone in self.gone):
             return True
@@ -126,6 +126,10 @@ class SceneView:
     def lines_of(self, executable: str) -> list[Line]:
         """What *executable* printed."""
         return [line for line in self.lines if line.source == executable]
+
+    def says(self, source: str, *texts: str) -> bool:
+        """Whether one of *texts* stands in what *source* printed."""
+        return any(text in line.text for line in self.lines if line.source == source for text in texts)
 
     def error_of(self, source: str) -> str:
         """The last line of the last traceback that *source* printed, else the last line it printed at all."""

@@ -155,7 +155,7 @@ class Observer:
         for pid, info in found.items():
             if not self._processes.get(pid):  # one that was seen before its exec has the name of its parent yet
                 script = next((part for part in info.command[:2] if marker in part), "")
-                executable = PurePosixPath(script).name if script else ""
+                executable = PurePosixPath(script).name if script else self._module(info.command)
                 if executable and self._processes.get(info.parent) == executable:
                     executable = ""  # a child of a node that has not become another program yet, or never will
                 self._processes[pid] = executable
@@ -167,6 +167,13 @@ class Observer:
                 self.ended_executables |= {executable}
                 by = EndedBy.GRADER if self._stopping else EndedBy.ITSELF
                 self.recorder.write(ProcessGone(self.recorder.now(), pid, by))
+
+    def _module(self, command: tuple[str, ...]) -> str:
+        """The label of this scene, when *command* runs the module of that name in the place of an executable."""
+        is_module = (
+            self._label and command[1:2] == ("-c",) and f"{lab.specification().package}.{self._label}" in command
+        )
+        return self._label if is_module else ""
 
     def _program_of(self, gid: str) -> str:
         """Which executable of the package the endpoint *gid* belongs to, as `Endpoint.program` has it."""
