@@ -126,10 +126,10 @@ bench: setup-dev ## measure how fast a grade is; writes build/bench.json
 	@PYTHONPATH=grader $(BIN)/python grader/tests/bench.py build/bench.json
 
 stress: setup-dev ## grade some animals again and again beside busy loops: TIMES=20 LOOPS=4; no verdict may change
-	@$(BIN)/python grader/tests/stress.py $(if $(TIMES),--times $(TIMES)) $(if $(LOOPS),--loops $(LOOPS))
+	@PYTHONPATH=grader $(BIN)/python grader/tests/stress.py $(if $(TIMES),--times $(TIMES)) $(if $(LOOPS),--loops $(LOOPS))
 
 record: setup-dev ## record anew the evidence that the tests of the checks judge
-	@$(BIN)/python grader/tests/record_evidence.py
+	@PYTHONPATH=grader $(BIN)/python grader/tests/record_evidence.py
 
 lock: setup-dev ## pin the dependencies anew: every *.in to its *.txt, with hashes
 	@for name in base sourced wheels dev dev-sourced; do \
