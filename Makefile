@@ -125,6 +125,12 @@ format: setup-dev ## put the code into its form
 bench: setup-dev ## measure how fast a grade is; writes build/bench.json
 	@PYTHONPATH=grader $(BIN)/python grader/tests/bench.py build/bench.json
 
+stress: setup-dev ## grade some animals again and again beside busy loops: TIMES=20 LOOPS=4; no verdict may change
+	@PYTHONPATH=grader $(BIN)/python grader/tests/stress.py $(if $(TIMES),--times $(TIMES)) $(if $(LOOPS),--loops $(LOOPS))
+
+record: setup-dev ## record anew the evidence that the tests of the checks judge
+	@PYTHONPATH=grader $(BIN)/python grader/tests/record_evidence.py
+
 lock: setup-dev ## pin the dependencies anew: every *.in to its *.txt, with hashes
 	@for name in base sourced wheels dev dev-sourced; do \
 		$(BIN)/uv pip compile --quiet --universal --python-version 3.10 --generate-hashes --no-header \

@@ -1,6 +1,6 @@
 """Records the evidence on which the pure tests judge: grades a few animals and packs what was observed.
 
-python grader/tests/record_evidence.py        (or `make record-evidence`)
+PYTHONPATH=grader python grader/tests/record_evidence.py        (or `make record-evidence`)
 """
 
 from __future__ import annotations
@@ -31,7 +31,6 @@ def pack(folder: Path, archive: Path) -> None:
 
 def main() -> None:
     """Grade the animals and pack their evidence."""
-    sys.path[:0] = [str(HERE), str(HERE.parent)]
     import zoo_builder
     from zoo_runner import Zoo, complaints
 

@@ -12,7 +12,8 @@ import zoo_builder
 from zoo_builder import CHECKS, GIT_CHECKS, Animal
 from zoo_runner import Zoo, complaints
 
-from lab2_grader import checks, evidence, pipeline, submission
+from lab2_grader import checks, evidence, pipeline, ros, submission
+from lab2_grader.errors import UsageError
 from lab2_grader.pipeline import Means
 from lab2_grader.records import Clock, Result, Status
 
@@ -63,14 +64,6 @@ def test_an_edit_that_does_not_fit_is_an_error(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="session")
-def zoo(request: pytest.FixtureRequest, means: Means, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Zoo]:
-    """The animals that this run of the tests asks for, being graded side by side."""
-    wanted = _asked_for(request, test_gets_its_verdicts.__name__)
-    with Zoo(means, tmp_path_factory.mktemp("zoo"), [ANIMALS[name] for name in wanted]) as zoo:
-        yield zoo
-
-
-@pytest.fixture(scope="session")
 def real_time_zoo(
     request: pytest.FixtureRequest, means: Means, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Zoo]:
@@ -78,6 +71,16 @@ def real_time_zoo(
     wanted = _asked_for(request, test_real_time_agrees.__name__)
     in_real_time = msgspec.structs.replace(means, clock=Clock.REAL_TIME)
     with Zoo(in_real_time, tmp_path_factory.mktemp("real"), [ANIMALS[name] for name in wanted], at_once=8) as zoo:
+        yield zoo
+
+
+@pytest.fixture(scope="session")
+def zoo(
+    request: pytest.FixtureRequest, means: Means, tmp_path_factory: pytest.TempPathFactory, real_time_zoo: Zoo
+) -> Iterator[Zoo]:
+    """The animals that this run of the tests asks for, being graded side by side; those in real time wait meanwhile."""
+    wanted = _asked_for(request, test_gets_its_verdicts.__name__)
+    with Zoo(means, tmp_path_factory.mktemp("zoo"), [ANIMALS[name] for name in wanted]) as zoo:
         yield zoo
 
 
@@ -98,6 +101,21 @@ def test_gets_its_verdicts(zoo: Zoo, name: str) -> None:
 )
 def test_real_time_agrees(real_time_zoo: Zoo, name: str) -> None:
     assert not complaints(ANIMALS[name], real_time_zoo.result(name).checks)
+
+
+@pytest.mark.parametrize("kind", ["sourced", "wheels"])
+def test_the_other_ros_agrees(kind: str, means: Means, tmp_path: Path) -> None:
+    """Sourced ROS with the real `ros2 launch`, and wheels with our launcher: whichever the other tests do not use."""
+    if kind == means.ros.kind:
+        return  # all animals run with this one
+    try:
+        other = msgspec.structs.replace(means, ros=ros.find(kind))
+    except UsageError as error:
+        pytest.skip(f"only one ROS is here: {error}")
+    animals = [animal for animal in SINGLE.values() if animal.under_load]
+    with Zoo(other, tmp_path, animals) as zoo:
+        for animal in animals:
+            assert not complaints(animal, zoo.result(animal.name).checks), animal.name
 
 
 @pytest.mark.parametrize("name", REPOSITORIES)

@@ -84,7 +84,7 @@ def launch_only_numeric(view: View, earlier: Earlier) -> Verdict:
     pair = view.specification.numeric
     numeric = (launched(pair.talker, build), launched(pair.listener, build))
     started = scene.started()
-    others = [name for name in started if name not in numeric]
+    others = [name for name in (*started, *scene.started_besides()) if name not in numeric]
     if others:
         file, line = source.written_in(view, _launch_source(view), others[0])
         return failed(check, "others", file, line, others=names(others))

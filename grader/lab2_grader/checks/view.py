@@ -95,6 +95,17 @@ class SceneView:
         seen = {process.executable for process in self.seen}
         return sorted(name for name in started if name in died and name not in seen)
 
+    def started_besides(self) -> list[str]:
+        """Programs that are none of the package's executables, as the launcher says: whoever forges that, harms himself.
+
+        What `ros2 run` starts as a process has been seen under its own name.
+        """
+        announced = self._announced(reading.PROCESS_STARTED)
+        seen = Counter(process.executable for process in self.seen)
+        by_hand = sum(count for name, count in seen.items() if name not in announced)
+        announced["ros2"] -= min(announced["ros2"], by_hand)
+        return sorted(name for name, count in announced.items() if count and name not in seen)
+
     def _announced(self, pattern: re.Pattern[str]) -> Counter[str]:
         matches = (pattern.match(line.text) for line in self.lines if line.source == "launch")
         return Counter(match[1] for match in matches if match)
