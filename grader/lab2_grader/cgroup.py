@@ -172,8 +172,21 @@ class Group:
         with contextlib.suppress(OSError):
             (folder / "cgroup.kill").write_text("1")
         for pid in self._pids(folder):
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.kill(pid, signal.SIGKILL)
+            self._kill(folder, pid)
+
+    def _kill(self, folder: Path, pid: int) -> None:
+        """SIGKILL to *pid*, if it still is in the group once it is held: its number may have been given to another."""
+        try:
+            descriptor = os.pidfd_open(pid)
+        except OSError:
+            return
+        try:
+            if pid in self._pids(folder):
+                signal.pidfd_send_signal(descriptor, signal.SIGKILL)
+        except OSError:
+            pass
+        finally:
+            os.close(descriptor)
 
     @staticmethod
     def _pids(folder: Path) -> list[int]:

@@ -103,7 +103,10 @@ class ProcessInfo:
 
 
 class _Stat:
-    """What the kernel counts of one process; `cpu_seconds` with that of its children that have ended."""
+    """What the kernel counts of one process; `cpu_seconds` with that of its children that have ended.
+
+    `started` (in ticks since the machine was) tells it from another that is given its number later.
+    """
 
     __slots__ = ("_fields", "parent")
 
@@ -122,6 +125,10 @@ class _Stat:
     @property
     def resident(self) -> int:
         return int(self._fields[21]) * PAGE_BYTES
+
+    @property
+    def started(self) -> int:
+        return int(self._fields[19])
 
 
 def _stat(pid: int) -> _Stat | None:
@@ -187,6 +194,22 @@ def _walk(root: int) -> dict[int, _Stat]:
 def alive(pid: int) -> bool:
     """Whether *pid* is a living process."""
     return _stat(pid) is not None
+
+
+def _kill_same(pid: int, seen: _Stat) -> None:
+    """SIGKILL to *pid*, if it still is the process that was *seen*: numbers are given again, here and on busy machines soon."""
+    try:
+        descriptor = os.pidfd_open(pid)
+    except OSError:
+        return
+    try:
+        now = _stat(pid)
+        if now is not None and now.started == seen.started:
+            signal.pidfd_send_signal(descriptor, signal.SIGKILL)
+    except OSError:
+        pass
+    finally:
+        os.close(descriptor)
 
 
 def tree(root: int) -> tuple[ProcessInfo, ...]:
@@ -398,9 +421,10 @@ class Process:
                     elif key.data == "end":
                         selector.unregister(pidfd)
                         ended_at = time.monotonic()
-                        self._popen.wait()
                         self._note_limit()
+                        # Before it is waited for: as long as it is a zombie nobody else can be given its number.
                         self._kill_rest()
+                        self._popen.wait()
                     elif not self._take(key.data, key.fd):
                         selector.unregister(key.fileobj)
                         open_streams -= 1
@@ -505,18 +529,23 @@ class Process:
         self._next_rung_at = time.monotonic() + wait
 
     def _kill_rest(self) -> None:
-        """SIGKILL to the group, to every descendant, and to strays that carry this run's mark, until none is found."""
+        """SIGKILL to the group, to every descendant, and to strays that carry this run's mark, until none is found.
+
+        Only while the process has not been waited for: afterwards its number may be somebody else's.
+        """
+        if self._popen.returncode is not None:
+            return
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.pid, signal.SIGKILL)
         if self._group is not None:
             self._group.kill()
         for _ in range(20):
-            alive = set(_descendants(self.pid)) | {pid for pid in _descendants(os.getpid()) if self._marked(pid)}
+            own = _descendants(self.pid)
+            alive = own | {pid: stat for pid, stat in _descendants(os.getpid()).items() if self._marked(pid)}
             if not alive:
                 return
-            for pid in alive:
-                with contextlib.suppress(ProcessLookupError, PermissionError):
-                    os.kill(pid, signal.SIGKILL)
+            for pid, stat in alive.items():
+                _kill_same(pid, stat)
 
     def _marked(self, pid: int) -> bool:
         """Whether *pid* carries the mark of this process, or of one that it started in turn."""

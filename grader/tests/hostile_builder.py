@@ -46,7 +46,7 @@ class Animal(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     any_of: tuple[str, ...] = ()
     says: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    seconds: float = 75
+    seconds: float = 120
     build_seconds: float = 0
     beside: str = ""
     slow: bool = False
