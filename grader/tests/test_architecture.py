@@ -36,7 +36,7 @@ LAYERS = (
     ("score",),
     ("report",),
     ("pipeline",),
-    ("classroom", "gradebook", "doctor"),
+    ("classroom", "gradebook", "doctor", "bag", "outlets"),
     ("cli", "__main__"),
 )
 LEVEL = {name: level for level, layer in enumerate(LAYERS) for name in layer}
