@@ -37,7 +37,7 @@ LAYERS = (
     ("report",),
     ("provenance", "bag", "outlets"),
     ("pipeline",),
-    ("classroom", "gradebook", "doctor"),
+    ("classroom", "gradebook", "doctor", "bag", "outlets"),
     ("cli", "__main__"),
 )
 LEVEL = {name: level for level, layer in enumerate(LAYERS) for name in layer}
