@@ -24,7 +24,7 @@ ISOLATION ?= auto
 SOURCED := $(if $(and $(ROS_DISTRO),$(shell command -v ros2 2>/dev/null)),yes,)
 
 .PHONY: help setup setup-dev isolation browser grade grade-all rescore doctor worksheet gradescope release \
-	release-solutions test test-slow lint format bench stress record clean lock
+	release-solutions test test-one test-slow lint format bench stress record clean lock
 
 help: ## list the commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -107,6 +107,9 @@ release-solutions: setup-dev ## make the solution and the staff edition, in dist
 test: setup-dev ## run every test but the slow ones
 	@cd grader && $(IN) python -m pytest -m "not slow"
 	@cd worksheet && $(IN) python -m pytest -m "not slow"
+
+test-one: setup-dev ## grade one animal of the zoo: ANIMAL=name
+	@cd grader && $(IN) python -m pytest tests/test_zoo.py -k "test_gets_its_verdicts and $(ANIMAL)"
 
 test-slow: setup-dev ## run the tests that take long
 	@cd grader && $(IN) python -m pytest -m slow

@@ -63,7 +63,7 @@ def _executables(found: Evidence, text: str) -> Evidence:
 def _launch_files(found: Evidence, text: str) -> Evidence:
     assert found.build is not None
     scenes = tuple(scene for scene in found.scenes if scene.name is not SceneName.CONVERSATION)
-    sources = (*found.submission.sources, SourceFile(f"{clean(text, 100)}/numeric_chatter.py", text))
+    sources = (SourceFile(f"{clean(text, 100)}/numeric_chatter.py", text), *found.submission.sources)
     named = replace(found.build, launch_files=(f"launch/{clean(text, 100)}",))
     return replace(found, scenes=scenes, build=named, submission=replace(found.submission, sources=sources))
 

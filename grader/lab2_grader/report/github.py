@@ -9,6 +9,7 @@ from __future__ import annotations
 from lab2_grader import lab, messages
 from lab2_grader.records import CheckResult, Status
 from lab2_grader.report.view import Report
+from lab2_grader.report.words import broken
 
 MOST = 9  # GitHub keeps ten a step of each kind and drops the rest without a word
 LENGTH = 600
@@ -86,8 +87,7 @@ def _path(report: Report, check: CheckResult, below: str) -> str:
 
 def _data(text: str) -> str:
     short = text if len(text) <= LENGTH else text[: LENGTH - 1] + "…"
-    broken = short.replace("##[", "# #[").replace("::", ": :")
-    return broken.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+    return broken(short).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
 def _property(text: str) -> str:

@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from lab2_grader.records import CheckResult, Result, Status
-from lab2_grader.report.words import STATUS_MARKS, STATUS_WORDS, mark
+from lab2_grader.report.words import STATUS_MARKS, STATUS_WORDS, broken, mark
 
 STYLES = {
     Status.PASS: "green",
@@ -31,7 +31,7 @@ def terminal(result: Result) -> RenderableType:
         for check in result.checks:
             if check.item == item.item:
                 parts += [_headline(check), *_help(check)]
-    notes = [Text(f"Note: {note}", style="dim") for note in result.notes]
+    notes = [Text(f"Note: {broken(note)}", style="dim") for note in result.notes]
     closing = Text.assemble(("Mark: ", "bold"), (mark(result), "bold green" if result.graded else "bold magenta"))
     return Group(*parts, Text(), *notes, *([Text()] if notes else []), closing)
 
@@ -44,7 +44,7 @@ def _headline(check: CheckResult) -> Table:
     row.add_column(overflow="fold")
     verdict = Text(f"  {STATUS_MARKS[check.status]} {STATUS_WORDS[check.status]}", style=STYLES[check.status])
     said = check.observed if check.status in (Status.BLOCKED, Status.NOT_ASSESSED, Status.INCONCLUSIVE) else check.title
-    row.add_row(verdict, f"{check.points}/{check.max_points}", check.id, Text(said, style="dim"))
+    row.add_row(verdict, f"{check.points}/{check.max_points}", check.id, Text(broken(said), style="dim"))
     return row
 
 
@@ -56,9 +56,9 @@ def _help(check: CheckResult) -> list[RenderableType]:
     rows = Table.grid(padding=(0, 1))
     rows.add_column(width=10, no_wrap=True, style="dim")
     rows.add_column(overflow="fold")
-    rows.add_row("expected", Text(check.expected))
-    rows.add_row("observed", Text(check.observed))
-    rows.add_row("try", Text(f"{check.hint}{where}"))
+    rows.add_row("expected", Text(broken(check.expected)))
+    rows.add_row("observed", Text(broken(check.observed)))
+    rows.add_row("try", Text(broken(f"{check.hint}{where}")))
     rows.add_row("worksheet", Text(f"section {check.section}"))
     return [Padding(rows, (0, 0, 1, 4))]
 

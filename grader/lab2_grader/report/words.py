@@ -24,6 +24,11 @@ STATUS_MARKS = {
 }
 
 
+def broken(text: str) -> str:
+    """*text* with both forms of GitHub's workflow commands broken, wherever in it they stand."""
+    return text.replace("##", "# #").replace("::", ": :")
+
+
 def mark(result: Result) -> str:
     """The mark in words: `92 of 100`, or that it is withheld."""
     return f"{result.score} of {result.max_score}" if result.graded else "withheld"
