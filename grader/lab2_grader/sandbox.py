@@ -18,6 +18,7 @@ from pathlib import Path
 import msgspec
 
 from lab2_grader import lab, process
+from lab2_grader.errors import FaultError
 from lab2_grader.records import Limits, Record, Request
 
 HOME = "/home/student"
@@ -65,15 +66,16 @@ def probe() -> Isolation:
     if shutil.which("bwrap") is None:
         return Isolation(False, "bubblewrap is not installed", "sudo apt-get install bubblewrap")
     nested = Request(("true",), process.environment("PATH"), "/", Limits(seconds=10))
-    outcome = process.run(private_network(confine(nested, (), Isolation(True)), Isolation(True)))
-    if outcome.code == 0:
+    try:
+        outcome = process.run(private_network(confine(nested, (), Isolation(True)), Isolation(True)))
+        said = outcome.stderr.decode(errors="replace").strip()
+        works, why = outcome.code == 0, said.splitlines()[-1] if said else f"exit code {outcome.code}"
+    except FaultError as fault:
+        works, why = False, str(fault)
+    if works:
         return Isolation(True)
-    said = outcome.stderr.decode(errors="replace").strip().splitlines()
-    return Isolation(
-        False,
-        f"bubblewrap does not work here ({said[-1] if said else f'exit code {outcome.code}'})",
-        "sudo sysctl -w kernel.apparmor_restrict_unprivileged_userns=0",
-    )
+    mend = "sudo sysctl -w kernel.apparmor_restrict_unprivileged_userns=0"
+    return Isolation(False, f"bubblewrap does not work here ({why.rstrip('.')})", mend)
 
 
 def private_network(request: Request, isolation: Isolation) -> Request:

@@ -113,9 +113,13 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
+# The limits of the whole tree, one animal each, are in the normal run; all others in `make test-slow`.
+NORMAL = ("fork-bomb", "thread-bomb", "memory-hog", "memory-hog-of-many", "disk-filler", "shared-memory-filler")
+
+
 def _parameters() -> list[object]:
     return [
-        pytest.param(name, marks=[pytest.mark.slow] if animal.slow else [])
+        pytest.param(name, marks=[] if name in NORMAL and not animal.slow else [pytest.mark.slow])
         for name, animal in ANIMALS.items()
         if name not in {other.beside for other in ANIMALS.values()}
     ]

@@ -118,9 +118,7 @@ def test_gets_its_verdicts(zoo: Zoo, name: str) -> None:
     assert result.score == sum(c.max_points for c in result.checks if c.status is Status.PASS)
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n in WATCHED else [pytest.mark.slow]) for n in SINGLE]
-)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[] if n in WATCHED else [pytest.mark.slow]) for n in SINGLE])
 def test_real_time_agrees(real_time_zoo: Zoo, name: str) -> None:
     assert not complaints(ANIMALS[name], real_time_zoo.result(name).checks)
 
