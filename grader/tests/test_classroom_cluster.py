@@ -38,7 +38,7 @@ def started(
     }
     argv = [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]]
     with log.open("w") as file:
-        process = subprocess.Popen(argv, env=environment, stdout=subprocess.DEVNULL, stderr=file)
+        process = subprocess.Popen(argv, env=environment, cwd=log.parent, stdout=subprocess.DEVNULL, stderr=file)
     try:
         deadline = time.monotonic() + 60
         while not (match := re.search(wanted, log.read_text())):

@@ -53,7 +53,7 @@ class Run:
 
     def reach(self, stage: str) -> None:
         """Wait until the submission's own code runs in that stage."""
-        marker = {"build": "setup.py", "scenes": "/lib/lab2/"}[stage]
+        marker = {"build": "contextlib import suppress", "scenes": "/lib/lab2/"}[stage]  # colcon asks setup.py like so
         self.until(lambda: any(marker in line for line in traces.processes(f"{self.popen.pid}.")))
 
     def end(self) -> int:
