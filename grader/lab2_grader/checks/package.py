@@ -15,7 +15,7 @@ from lab2_grader.stand_in import misdirected
 
 Earlier = Mapping[str, Verdict]
 
-SYNTAX_ERROR = re.compile(r'File "[^"]*?([\w./-]+\.py)", line (\d+)')
+PLACE = re.compile(r'File "([^"]+)", line (\d+)')
 ERROR_LINE = re.compile(r"^\s*((?:[A-Za-z_.]*(?:Error|Exception)|error)\b.*)$")
 
 
@@ -33,18 +33,28 @@ def package_builds(view: View, earlier: Earlier) -> Verdict:
         return failed(check, f"limit-{build.limit}")
     if build.code == 0:
         return failed(check, "nothing-installed")
-    error = _last_error(build)
-    where = SYNTAX_ERROR.findall(build.log)
-    if where and error.startswith(("SyntaxError", "IndentationError", "TabError")):
-        file, line = where[-1]
-        return failed(check, "syntax", file=file.rsplit("/", 1)[-1], line=int(line), error=error)
+    error, file, line = _last_error(build)
+    if line and error.startswith(("SyntaxError", "IndentationError", "TabError")):
+        return failed(check, "syntax", file=file, line=line, error=error)
     return failed(check, "error", error=error)
 
 
-def _last_error(build: Build) -> str:
-    found = [match[1] for line in build.log.splitlines() if (match := ERROR_LINE.match(line))]
+def _last_error(build: Build) -> tuple[str, str, int]:
+    """(error, file, line) of the last error of the package's own that the build printed; no file and 0 when it names none.
+
+    That a program which colcon ran has failed is colcon's error, and follows from the package's own.
+    """
+    file, number, found = "", 0, ("", "", 0)
+    for text in build.log.splitlines():
+        if place := PLACE.search(text):
+            # setuptools runs setup.py as a text without a name.
+            file, number = "setup.py" if place[1] == "<string>" else place[1].rsplit("/", 1)[-1], int(place[2])
+        elif (match := ERROR_LINE.match(text)) and "CalledProcessError" not in match[1]:
+            found = (match[1], file, number)
+    if found[0]:
+        return found
     lines = [line for line in build.log.splitlines() if line.strip()]
-    return found[-1] if found else lines[-1] if lines else messages.phrase("exit-code", code=str(build.code))
+    return (lines[-1] if lines else messages.phrase("exit-code", code=str(build.code))), "", 0
 
 
 def entry_points(view: View, earlier: Earlier) -> Verdict:
