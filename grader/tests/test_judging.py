@@ -232,4 +232,7 @@ def test_the_period_is_a_note_and_no_verdict(solution: Evidence) -> None:
     result = score.score(solution, checks.judge(solution), lab.rubric(), "")
     other = with_events(solution, SceneName.CONVERSATION, slow)
     assert score.score(other, checks.judge(other), lab.rubric(), "").score == result.score
-    assert any("0.5 s" in note for note in result.notes)
+    scene = solution.scene(SceneName.CONVERSATION)
+    assert scene is not None
+    period = next(e.value for e in scene.events if isinstance(e, Measured) and e.name == "period_seconds")
+    assert any(f"{period:g} s" in note for note in result.notes)
