@@ -21,26 +21,8 @@ SINGLE, PAIRS, REPOSITORIES = zoo_builder.animals(), zoo_builder.pairs(), zoo_bu
 ANIMALS = SINGLE | PAIRS
 
 
-EVERY = 3  # of the right animals and of the pairs, one in so many is in the normal run; all are in `make test-slow`
-IN_REAL_TIME = 8  # animals that the normal run also watches in real time, side by side
-
-
-def _normal() -> frozenset[str]:
-    """The animals of the normal run: one for each fault of the catalogue, and some of the right ones and the pairs."""
-    shown: set[tuple[str, str]] = set()
-    chosen = {name for name, animal in SINGLE.items() if animal.under_load or animal.agrees}
-    for name, animal in SINGLE.items():
-        faults = {(check, key) for check, (key, _) in animal.fails.items()}
-        if not faults <= shown:
-            chosen.add(name)
-            shown |= faults
-    right = [name for name, animal in SINGLE.items() if animal.right]
-    chosen |= {*right[::EVERY], *list(PAIRS)[::EVERY]}
-    return frozenset(name for name in chosen if not ANIMALS[name].slow)
-
-
-NORMAL = _normal()
-WATCHED = [name for name, animal in SINGLE.items() if animal.agrees][:IN_REAL_TIME]
+NORMAL = frozenset(msgspec.toml.decode((zoo_builder.HERE / "zoo_normal.toml").read_bytes())["normal"])
+WATCHED = ("solution",)  # in real time in the normal run; all others in `make test-slow`
 
 
 def _parameters(animals: dict[str, Animal]) -> list[object]:
@@ -48,6 +30,10 @@ def _parameters(animals: dict[str, Animal]) -> list[object]:
 
 
 # --- the zoo itself ---------------------------------------------------------------------------------
+
+
+def test_the_normal_run_is_of_the_zoo() -> None:
+    assert NORMAL <= ANIMALS.keys()
 
 
 def test_the_zoo_is_large_enough() -> None:
