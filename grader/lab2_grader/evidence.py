@@ -6,7 +6,7 @@
       build.json           Build, once the build has ended
       <scene>.jsonl        what an observer saw, one `Event` a line, as it happened
 
-Every field is documented where it is declared, in `records.py`; `grader/docs/evidence.md` shows an example of each.
+Every field is documented where it is declared, in `records.py`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Records the evidence on which the pure tests judge: grades a few animals and packs what was observed.
 
-PYTHONPATH=grader python grader/tests/record_evidence.py        (or `make record-evidence`)
+PYTHONPATH=grader python grader/tests/record_evidence.py        (or `make record`)
 """
 
 from __future__ import annotations
