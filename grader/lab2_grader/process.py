@@ -196,8 +196,8 @@ def alive(pid: int) -> bool:
     return _stat(pid) is not None
 
 
-def _kill_same(pid: int, seen: _Stat) -> None:
-    """SIGKILL to *pid*, if it still is the process that was *seen*: numbers are given again, here and on busy machines soon."""
+def _signal_same(pid: int, number: signal.Signals, seen: _Stat) -> None:
+    """Signal *pid*, if it still is the process that was *seen*: numbers are given again, here and on busy machines soon."""
     try:
         descriptor = os.pidfd_open(pid)
     except OSError:
@@ -205,11 +205,24 @@ def _kill_same(pid: int, seen: _Stat) -> None:
     try:
         now = _stat(pid)
         if now is not None and now.started == seen.started:
-            signal.pidfd_send_signal(descriptor, signal.SIGKILL)
+            signal.pidfd_send_signal(descriptor, number)
     except OSError:
         pass
     finally:
         os.close(descriptor)
+
+
+@contextlib.contextmanager
+def held(pids: Iterable[int]) -> Iterator[None]:
+    """Keep the processes *pids* from running until the block ends."""
+    seen = [(pid, stat) for pid in pids if (stat := _stat(pid)) is not None]
+    try:
+        for pid, stat in seen:
+            _signal_same(pid, signal.SIGSTOP, stat)
+        yield
+    finally:
+        for pid, stat in seen:
+            _signal_same(pid, signal.SIGCONT, stat)
 
 
 def tree(root: int) -> tuple[ProcessInfo, ...]:
@@ -545,7 +558,7 @@ class Process:
             if not alive:
                 return
             for pid, stat in alive.items():
-                _kill_same(pid, stat)
+                _signal_same(pid, signal.SIGKILL, stat)
 
     def _marked(self, pid: int) -> bool:
         """Whether *pid* carries the mark of this process, or of one that it started in turn."""

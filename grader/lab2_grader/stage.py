@@ -9,6 +9,7 @@ from __future__ import annotations
 import random
 import re
 import sys
+import threading
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -42,6 +43,8 @@ OBSERVER_OUTPUT_BYTES = 100_000_000  # more than it can have to say: what it kee
 OBSERVER_MEMORY_BYTES = 1_000_000_000  # beyond what the submission may use
 OBSERVER_GRACE_SECONDS = 30.0
 EARLY_OBSERVERS = 3  # conversation, listener, originals: what a normal submission needs
+HEAD_START_SECONDS = 1.0  # of a scene over the next, at most; it ends sooner when its graph is there
+GRAPH_IS_THERE = b'"graph"'  # as the observer writes the name of that phase
 WORDS = (
     "amber",
     "birch",
@@ -98,11 +101,17 @@ class _Observer:
         elif self._sink is not None:
             self._sink(data)
 
-    def play(self, plan: ScenePlan, started_with: str, path: Path) -> Scene:
-        """Play *plan*, writing what is observed to *path*, and return it."""
+    def play(self, plan: ScenePlan, started_with: str, path: Path, started: threading.Event) -> Scene:
+        """Play *plan*, writing what is observed to *path*, and return it; sets *started* when its graph is there."""
         began = time.monotonic()
         with path.open("wb", buffering=0) as file:
-            self._sink = file.write
+
+            def sink(data: bytes) -> None:
+                file.write(data)
+                if GRAPH_IS_THERE in data:
+                    started.set()
+
+            self._sink = sink
             program = msgspec.structs.replace(plan.program, env=plan.program.env + self._world)
             self._process.send(msgspec.json.encode(msgspec.structs.replace(plan, program=program)) + b"\n")
             outcome = self._process.wait()
@@ -174,6 +183,9 @@ class Stage:
     def play(self, build: Build, installed: Path) -> tuple[Scene, ...]:
         """Play every scene that this build allows, side by side.
 
+        Each begins when the programs of the one before are there, the longest first: all at once would keep each other from
+        starting.
+
         Args:
             build: What was built.
             installed: Where it was unpacked: the folder that holds `install/`.
@@ -183,29 +195,37 @@ class Stage:
         """
         specification = lab.specification()
         numeric, original = specification.numeric, specification.original
-        jobs: list[Callable[[], tuple[Scene, ...]]] = [lambda: self._conversation_and_talker(build, installed)]
-        if self._single(numeric.listener, build, installed) is not None:
-            jobs.append(lambda: (self._listener(build, installed),))
+        jobs: list[Callable[[threading.Event], tuple[Scene, ...]]] = [
+            lambda started: self._conversation_and_talker(build, installed, started)
+        ]
         if _launch_path(build, original.launch_file):
-            jobs.append(lambda: (self._launched(SceneName.ORIGINALS, build, installed, original),))
+            jobs.append(lambda started: (self._launched(SceneName.ORIGINALS, build, installed, original, started),))
+        if self._single(numeric.listener, build, installed) is not None:
+            jobs.append(lambda started: (self._listener(build, installed, started),))
         with ThreadPoolExecutor(max_workers=len(jobs)) as pool:
-            futures: list[Future[tuple[Scene, ...]]] = [pool.submit(job) for job in jobs]
+            futures: list[Future[tuple[Scene, ...]]] = []
+            for job in jobs:
+                started = threading.Event()
+                futures.append(pool.submit(job, started))
+                started.wait(HEAD_START_SECONDS)
             try:
                 scenes = {scene.name: scene for future in futures for scene in future.result()}
             except BaseException:
                 self._dismiss_all()
                 raise
         if remappings := _remappings_that_help(scenes, launched(numeric.listener, build)):
-            scenes[SceneName.LISTENER] = self._listener(build, installed, remappings)
+            scenes[SceneName.LISTENER] = self._listener(build, installed, threading.Event(), remappings)
         return tuple(scenes[name] for name in SceneName if name in scenes)
 
     # --- one scene each ---------------------------------------------------------------------
 
-    def _conversation_and_talker(self, build: Build, installed: Path) -> tuple[Scene, ...]:
+    def _conversation_and_talker(
+        self, build: Build, installed: Path, started: threading.Event
+    ) -> tuple[Scene, ...]:
         scenes: tuple[Scene, ...] = ()
         numeric = lab.specification().numeric
         if _launch_path(build, numeric.launch_file):
-            scenes = (self._launched(SceneName.CONVERSATION, build, installed, numeric),)
+            scenes = (self._launched(SceneName.CONVERSATION, build, installed, numeric, started),)
             if _shows_talker(scenes[0], launched(numeric.talker, build)):
                 return scenes
         follow = ("-p", "use_sim_time:=true") if self._clock is Clock.TIME_LAPSE else ()
@@ -213,9 +233,11 @@ class Stage:
         if single is None:
             return scenes
         how, label, request = single
-        return (*scenes, self._play(ScenePlan(SceneName.TALKER, self._clock, request, label), how))
+        return (*scenes, self._play(ScenePlan(SceneName.TALKER, self._clock, request, label), how, started))
 
-    def _launched(self, name: SceneName, build: Build, installed: Path, pair: lab.Pair) -> Scene:
+    def _launched(
+        self, name: SceneName, build: Build, installed: Path, pair: lab.Pair, started: threading.Event
+    ) -> Scene:
         clock = self._clock if name is SceneName.CONVERSATION else Clock.REAL_TIME
         package = lab.specification().package
         path = f"{self._prefix(installed)}/share/{package}/{_launch_path(build, pair.launch_file)}"
@@ -223,9 +245,11 @@ class Stage:
         request = self._confined(argv, installed)
         is_original = name is SceneName.ORIGINALS
         talker, listener = (n if is_original else launched(n, build) for n in (pair.talker, pair.listener))
-        return self._play(ScenePlan(name, clock, request, "", talker, listener), "launch")
+        return self._play(ScenePlan(name, clock, request, "", talker, listener), "launch", started)
 
-    def _listener(self, build: Build, installed: Path, remappings: tuple[str, ...] = ()) -> Scene:
+    def _listener(
+        self, build: Build, installed: Path, started: threading.Event, remappings: tuple[str, ...] = ()
+    ) -> Scene:
         listener, limits = lab.specification().numeric.listener, lab.limits().listener
         single = self._single(listener, build, installed, remappings)
         assert single is not None
@@ -233,14 +257,14 @@ class Stage:
         numbers = tuple(self._random.sample(range(-128, 128), limits.numbers + 1))
         texts = tuple(" ".join(self._random.sample(WORDS, 3)) for _ in range(limits.texts + 1))
         plan = ScenePlan(SceneName.LISTENER, Clock.REAL_TIME, request, label, numbers=numbers, texts=texts)
-        return self._play(plan, how)
+        return self._play(plan, how, started)
 
-    def _play(self, plan: ScenePlan, started_with: str) -> Scene:
+    def _play(self, plan: ScenePlan, started_with: str, started: threading.Event) -> Scene:
         try:
             observer = self._waiting.pop()
         except IndexError:
             observer = self._observer()
-        return observer.play(plan, started_with, self._writer.scene_path(plan.scene))
+        return observer.play(plan, started_with, self._writer.scene_path(plan.scene), started)
 
     # --- what is started --------------------------------------------------------------------
 

@@ -17,8 +17,10 @@ from typing import Any
 import msgspec
 import rclpy
 from rclpy.context import Context
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
@@ -46,7 +48,9 @@ QUEUE_DEPTH = 1000  # the observer never loses what it could have heard
 GRAPH_SHARE = 5  # at most one part in so many of the observer's time goes into looking at the graph
 GRAPH_POLL_SECONDS = 0.02
 PROCESS_POLL_SECONDS = 0.1
-QUICK_PROCESS_POLL_SECONDS = 0.02  # until the first message: what dies at once must have been seen
+QUICK_PROCESS_POLL_SECONDS = 0.04  # until the first message: what dies at once must have been seen
+UNNAMED = "_NODE_NAME_UNKNOWN_"  # the node of an endpoint whose participant has not said its names yet
+UNNAMED_SECONDS = 1.0  # it is waited for so long
 PROCESS_ID = slice(4, 6)  # of an identity of Fast DDS (GUID prefix): the low half of the process's own pid
 UNSUPPORTED = "[lab2-launcher] unsupported: "
 
@@ -70,14 +74,17 @@ class Observer:
         self.lines: list[Line] = []
         self.endpoints: dict[str, Endpoint] = {}
         self._changed_at = 0.0
+        self._unnamed: dict[str, float] = {}  # since when an endpoint has been there without the name of its node
         self._nodes: frozenset[str] = frozenset()
         self.ended: ProgramEnded | None = None
         self._context = Context()
         # Without log files there is nothing that the observer must be able to write.
         rclpy.init(args=["--ros-args", "--disable-external-lib-logs"], context=self._context)
         self.name = f"observer_{secrets.token_hex(6)}"
-        self.node = Node(self.name, context=self._context, enable_rosout=False, start_parameter_services=False)
+        self.node = _quiet_node(self.name, self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
+        # `Executor.wake` does not end a round; something that has a callback does.
+        self._news = self.node.create_guard_condition(lambda: None)
         self._executor.add_node(self.node)
         self._subscribed: set[Handle] = set()
         self._types: dict[str, list[str]] = {}  # of each topic, in the order in which they were met
@@ -107,7 +114,7 @@ class Observer:
 
     def _on_output(self, stream: str, data: bytes) -> None:
         self._output.put((stream, data))
-        self._executor.wake()
+        self._news.trigger()
 
     def stop(self) -> None:
         """Stop the program and record how it ended."""
@@ -143,6 +150,10 @@ class Observer:
     def executables(self) -> frozenset[str]:
         """Names of the package's executables that are running now."""
         return frozenset(filter(None, self._processes.values()))
+
+    def held(self, executable: str) -> contextlib.AbstractContextManager[None]:
+        """Keep the processes of *executable* from running until the block ends."""
+        return process.held([pid for pid, name in self._processes.items() if name == executable])
 
     def _look_at_processes(self) -> None:
         if self._program is None:
@@ -255,6 +266,10 @@ class Observer:
                     if info.node_name == self.name:
                         continue
                     gid = bytes(info.endpoint_gid).hex()
+                    if info.node_name == UNNAMED and now - self._unnamed.setdefault(gid, now) < UNNAMED_SECONDS:
+                        self._changed_at = now
+                        if gid not in self.endpoints:
+                            continue
                     found[gid] = self.endpoints.get(gid) or self._endpoint(now, kind, gid, topic, info)
         for gid, endpoint in found.items():
             if gid not in self.endpoints:
@@ -314,11 +329,13 @@ class Observer:
             kept = clean(data, 1000) if isinstance(data, str) else data if isinstance(data, int | float) else None
             number = int(info["publication_sequence_number"] or 0)
             self._heard.put(Message(self.recorder.now(), topic, type_name, number, kept))
-            self._executor.wake()
+            self._news.trigger()
 
         # A name that rclpy does not accept was not made with rclpy: nothing that is asked for is heard there.
         with contextlib.suppress(ValueError, RuntimeError):
-            self._node_for(topic, type_name).create_subscription(message_type, topic, heard, qos)
+            self._node_for(topic, type_name).create_subscription(
+                message_type, topic, heard, qos, event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False)
+            )
 
     def _node_for(self, topic: str, type_name: str) -> Node:
         """The node that subscribes to *topic* as that type.
@@ -333,7 +350,7 @@ class Observer:
         while len(self._more_nodes) < rank:
             context = Context()
             rclpy.init(args=["--ros-args", "--disable-external-lib-logs"], context=context)
-            node = Node(self.name, context=context, enable_rosout=False, start_parameter_services=False)
+            node = _quiet_node(self.name, context)
             executor = SingleThreadedExecutor(context=context)
             executor.add_node(node)
             threading.Thread(target=executor.spin, name=self.name, daemon=True).start()
@@ -352,7 +369,8 @@ class Observer:
         """A publisher of the observer's own, with the default quality of service."""
         message_type = message_class(type_name)
         assert message_type is not None, type_name
-        return self.node.create_publisher(message_type, topic, 10)
+        no_events = PublisherEventCallbacks(use_default_callbacks=False)
+        return self.node.create_publisher(message_type, topic, 10, event_callbacks=no_events)
 
     def messages_on(self, topic: str) -> list[Message]:
         """The messages that came on *topic*."""
@@ -384,6 +402,17 @@ class Observer:
                 return False
             self.spin(min(left, GRAPH_POLL_SECONDS))
         return True
+
+
+def _quiet_node(name: str, context: Context) -> Node:
+    """A node with nothing that it is not asked for: whatever an executor has to look after costs it time in every round."""
+    return Node(
+        name,
+        context=context,
+        enable_rosout=False,
+        start_parameter_services=False,
+        parameter_overrides=[Parameter("start_type_description_service", value=False)],
+    )
 
 
 def message_class(type_name: str) -> Any | None:

@@ -99,7 +99,7 @@ def _conversation(observer: Observer, plan: ScenePlan) -> None:
     topics = (specification.number_topic, specification.text_topic)
     for topic in topics:
         observer.listen(topic.name, topic.type)
-    steps = LockStep(observer, plan.clock, plan.talker)
+    steps = LockStep(observer, plan.clock, plan.talker, plan.listener)
     wanted = frozenset((kind, topic.name) for kind in ("publisher", "subscription") for topic in topics)
     _start(observer, plan, wanted)
     if plan.clock is Clock.TIME_LAPSE:

@@ -175,6 +175,6 @@ def _wheels() -> Ros | None:
         prefixes=(sys.prefix,),
         python_path=(),
         library_path=libraries,
-        path=(str(Path(sys.executable).parent),),
+        path=(str(Path(sys.executable).absolute().parent),),
         has_ros2_launch=False,
     )
