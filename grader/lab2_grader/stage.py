@@ -219,9 +219,7 @@ class Stage:
 
     # --- one scene each ---------------------------------------------------------------------
 
-    def _conversation_and_talker(
-        self, build: Build, installed: Path, started: threading.Event
-    ) -> tuple[Scene, ...]:
+    def _conversation_and_talker(self, build: Build, installed: Path, started: threading.Event) -> tuple[Scene, ...]:
         scenes: tuple[Scene, ...] = ()
         numeric = lab.specification().numeric
         if _launch_path(build, numeric.launch_file):
