@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from datetime import date
 from pathlib import Path
 from typing import TypeVar
@@ -13,6 +14,8 @@ from lab2_grader.errors import UsageError
 from lab2_grader.records import Limits, Record
 
 FACTS = Path(__file__).parent / "facts"
+TABLE = re.compile(r"\[\[?\s*([\w.-]+)\s*\]")  # the header of a table in TOML
+VALUE = re.compile(r"at `\$\.(\w+)\[(\d+)\](?:\.(\w+))?`")  # where a value stands, as msgspec says it
 
 T = TypeVar("T")
 
@@ -262,7 +265,14 @@ def _read(path: Path, kind: type[T]) -> T:
     except OSError as error:
         raise UsageError(f"{path} cannot be read: {error.strerror}.") from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path.name} is not valid: {error}.") from error
+        raise UsageError(f"{path.name} is not valid: {error}{_where(path, str(error))}.") from error
+
+
+def _where(path: Path, error: str) -> str:
+    """` (line 12)` when *error* says which value of which table it is about; else empty."""
+    if (value := VALUE.search(error)) and (line := _line(path.read_text("utf-8"), value[1], int(value[2]), value[3])):
+        return f" (line {line})"
+    return ""
 
 
 @functools.cache
@@ -287,9 +297,60 @@ def rubric(path: Path | None = None) -> Rubric:
     """The rubric of *path*, or the lab's own.
 
     Raises:
-        UsageError: The file does not validate.
+        UsageError: The file does not validate; the text names the line.
     """
-    return _read(path or FACTS / "rubric.toml", Rubric)
+    own = FACTS / "rubric.toml"
+    found = _read(path or own, Rubric)
+    if path is not None:
+        _refuse_odd_rubric(path, found, {check.id for check in _read(own, Rubric).check})
+    return found
+
+
+def _refuse_odd_rubric(path: Path, found: Rubric, known: set[str]) -> None:
+    """Refuse what is a rubric by its form, but cannot be one of this lab.
+
+    Args:
+        path: Where it stands.
+        found: What stands there.
+        known: The ids of all checks.
+    """
+    text = path.read_text(encoding="utf-8")
+    ids, items = [check.id for check in found.check], [item.item for item in found.checklist]
+
+    def refuse(table: str, index: int, key: str, why: str) -> None:
+        raise UsageError(f"{path.name}, line {_line(text, table, index, key)}: {why}")
+
+    for index, check in enumerate(found.check):
+        if check.id not in known:
+            refuse("check", index, "id", f"there is no check {check.id}. There are: {', '.join(sorted(known))}.")
+        if check.id in ids[:index]:
+            refuse("check", index, "id", f"the check {check.id} stands here a second time.")
+        if check.item not in items:
+            refuse("check", index, "item", f"there is no checklist item {check.item}. There are: {', '.join(items)}.")
+        if check.points < 0:
+            refuse("check", index, "points", f"a check cannot be worth {check.points} points.")
+    if missing := sorted(known.difference(ids)):
+        raise UsageError(f"{path.name} lacks the check {missing[0]}. Give it 0 points if it is not to count.")
+    for index, item in enumerate(items):
+        if item in items[:index]:
+            refuse("checklist", index, "item", f"the item {item} stands here a second time.")
+        if not any(check.points for check in found.check if check.item == item):
+            refuse("checklist", index, "item", f"no check gives points for the item {item}.")
+
+
+def _line(text: str, table: str, index: int, key: str) -> int:
+    """The line of *key* in the table of that name and number (from 0) in the TOML *text*; 0 when it is not found."""
+    count = -1
+    within = False
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := TABLE.match(line):
+            within = header[1] == table
+            count += within
+            if within and count == index and not key:
+                return number
+        elif within and count == index and line.split("=")[0].strip() == key:
+            return number
+    return 0
 
 
 @functools.cache

@@ -93,6 +93,8 @@ ROBOTS = (
     "Traceback (most recent call last):",
     r"executable '([^']*)' not found on the libexec directory",
     "' has no attribute '",
+    "'NoneType' object has no attribute 'get_launch_arguments",
+    "required keyword-only argument: 'executable'",
     "No space left on device",
     "File too large",
     "has no setter",

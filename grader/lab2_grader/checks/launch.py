@@ -18,8 +18,14 @@ Earlier = Mapping[str, Verdict]
 CAUGHT = re.compile(r"Caught (?:multiple exceptions?|exception) .*?: ?(.*)$")
 NO_EXECUTABLE = re.compile(r"executable '([^']*)' not found on the libexec directory")
 NO_PACKAGE = re.compile(r"""[Pp]ackage ['"][^'"]*['"] not found""")
+# What a launch says when its file is wrong in a common way, and which fault that is.
+COMMON_ERRORS = {
+    "required keyword-only argument: 'executable'": "no-executable-argument",
+    "generate_launch_description": "no-function",
+    "'NoneType' object has no attribute 'get_launch_arguments": "no-return",
+}
 NEARBY, NEARBY_PER_MESSAGE = 100, 2  # lines that can belong to a message: so many, and so many for each before it
-NOT_WHAT_IT_RECEIVES = ("silent", "others", "noise", "no-f-string")  # a listener whose lines answer nothing
+NOT_WHAT_IT_RECEIVES = ("silent", "constant", "others", "noise", "no-f-string")  # a listener whose lines answer nothing
 ENOUGH_ANSWERS = 8  # of the slow dozen; the first few may be lost while the pair still discovers each other
 
 
@@ -51,7 +57,8 @@ def launch_starts(view: View, earlier: Earlier) -> Verdict:
     if NO_PACKAGE.search(error):
         return failed(check, "wrong-package", error=error)
     if error:
-        return failed(check, "raised", error=error)
+        key = next((key for text, key in COMMON_ERRORS.items() if text in error), "raised")
+        return failed(check, key, error=error)
     if not started:
         return failed(check, "nothing")
     return failed(check, "others", started=names(started), missing=names(missing))
@@ -189,7 +196,11 @@ def launch_error(scene: SceneView) -> str:
     own = [line.text for line in scene.lines if line.source == "launch"]
     for index, text in enumerate(own):
         if match := CAUGHT.search(text):
-            return match[1] or next(iter(own[index + 1 :]), text)
+            inner = CAUGHT.search(
+                match[1]
+            )  # an exception that says which others were caught, each on a line of its own
+            error = inner[1] if inner else match[1]
+            return error or next(iter(own[index + 1 :]), text).strip().removeprefix("- ")
     if scene.ended is not None and scene.ended.code not in (0, None):
         return scene.error_of("launch")
     return ""

@@ -33,7 +33,8 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
     sent = _sent(scene, topic.name)
     printed = _numbers_printed(scene)
     missing = [row for row in sent if int(row.data) not in printed.get(row.at, frozenset())]
-    strange = frozenset[int]().union(*printed.values()) - {int(row.data) for row in sent}
+    everything = frozenset[int]().union(*printed.values())
+    strange = everything - {row.data for row in scene.sent if isinstance(row.data, int)}
     if sent and not missing and _death(scene) != topic.name:
         return failed(check, "noise") if len(strange) > NOISE else passed(check)
     if death := _death(scene):
@@ -50,6 +51,8 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
     if len(missing) > len(sent) // 2:
         if literal := next((line for line in scene.lines if LITERAL.search(line.text)), None):
             return failed(check, "no-f-string", shown=said(literal.text))
+        if len(everything) == 1:
+            return failed(check, "constant", sent=len(sent), shown=next(iter(everything)))
         if strange := _plausible(strange):
             shown = ", ".join(str(number) for number in sorted(strange)[:5])
             return failed(check, "others", sent=", ".join(str(row.data) for row in sent[:5]), shown=shown)

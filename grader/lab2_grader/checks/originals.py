@@ -27,7 +27,9 @@ def originals_kept(view: View, earlier: Earlier) -> Verdict:
     if scene.unsupported:
         return inconclusive(check, "inconclusive-unsupported", what=scene.unsupported[0].what)
     pair = (original.talker, original.listener)
-    if not scene.spoke(topic.name, original.talker):
+    started = scene.started()
+    missing = [name for name in pair if name not in started]
+    if not missing and not scene.spoke(topic.name, original.talker):
         return failed(check, "strangers")
     texts = [message for message in scene.messages if message.topic == topic.name and message.type == topic.type][
         :MOST_TEXTS
@@ -37,8 +39,6 @@ def originals_kept(view: View, earlier: Earlier) -> Verdict:
         for message in texts
         if any(str(message.data) in line.text for line in scene.lines_of(original.listener))
     ]
-    started = scene.started()
-    missing = [name for name in pair if name not in started]
     wanted = lab.limits().originals.messages
     if len(printed) >= wanted and not missing:
         return passed(check)

@@ -36,6 +36,9 @@ def package_builds(view: View, earlier: Earlier) -> Verdict:
     error, file, line = _last_error(build)
     if line and error.startswith(("SyntaxError", "IndentationError", "TabError")):
         return failed(check, "syntax", file=file, line=line, error=error)
+    file, line = source.joined_entry_points(view)
+    if line:
+        return failed(check, "comma", file, line)
     return failed(check, "error", error=error)
 
 
@@ -108,4 +111,4 @@ def _function_is_missing(view: View, name: str, target: str) -> bool:
     """Whether the executable was run and said that its module has no such function."""
     module, _, function = target.partition(":")
     said = f"module '{module.strip()}' has no attribute '{function.strip()}'"
-    return any(said in line.text for scene in view.scenes() for line in scene.lines if line.source == name)
+    return any(scene.says(name, said) for scene in view.scenes())

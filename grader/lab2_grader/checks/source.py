@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 
 from lab2_grader.checks.view import View
 
 Place = tuple[str, int]  # file within the package, line from 1
 NOWHERE: Place = ("", 0)
+ENTRY_POINT = re.compile(r"[\w-]+\s*=\s*[\w.]+:")  # name = package.module:function
 
 
 def overwritten_publisher(view: View) -> tuple[str, str, int] | None:
@@ -81,6 +83,15 @@ def written_in(view: View, path: str, text: str) -> Place:
     """Where *text* stands in one of the strings of the file *path*."""
     for node in _walk(_parsed(view, path)[1]):
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and text in node.value:
+            return path, node.lineno
+    return NOWHERE
+
+
+def joined_entry_points(view: View) -> Place:
+    """Where two entry points are one text, because the comma between them is missing; NOWHERE when they are not."""
+    path = "setup.py"
+    for node in _walk(_parsed(view, path)[1]):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and len(ENTRY_POINT.findall(node.value)) > 1:
             return path, node.lineno
     return NOWHERE
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from lab2_grader.checks import source
-from lab2_grader.checks.sequence import Sequel, Step, analyse, around
+from lab2_grader.checks.sequence import Sequel, Step, around
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
 from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
@@ -77,7 +77,7 @@ def talker_start(view: View, earlier: Earlier) -> Verdict:
     check = "talker-start"
     if stop := _unheard(check, view, earlier):
         return stop
-    sequel = _sequel(view)
+    sequel = view.sequel
     if sequel is None:
         return failed(check, "not-numbers", shown=", ".join(str(message.data) for message in view.numbers[:3]))
     smallest = view.specification.number_topic.smallest
@@ -96,7 +96,7 @@ def talker_step(view: View, earlier: Earlier) -> Verdict:
     check = "talker-step"
     if stop := _unheard(check, view, earlier):
         return stop
-    sequel, scene = _sequel(view), view.talking
+    sequel, scene = view.sequel, view.talking
     assert scene is not None
     if sequel is None or not sequel.values:
         return blocked(check, "talker-start")
@@ -127,7 +127,7 @@ def talker_wrap(view: View, earlier: Earlier) -> Verdict:
     check = "talker-wrap"
     if stop := _unheard(check, view, earlier):
         return stop
-    sequel, scene = _sequel(view), view.talking
+    sequel, scene = view.sequel, view.talking
     assert scene is not None
     if sequel is None or not sequel.values:
         return blocked(check, "talker-start")
@@ -196,6 +196,8 @@ def talker_chatter(view: View, earlier: Earlier) -> Verdict:
         if all(endpoint.reliability == "best-effort" for endpoint in publishers):
             return failed(check, "best-effort")
         return passed(check)
+    if earlier["talker-type"].status is Status.BLOCKED:
+        return blocked(check, *earlier["talker-type"].because)
     if earlier["talker-type"].message in ("died", "ended", "wrong-message", "no-setter", "two-types"):
         return blocked(check, "talker-type")
     if publishers and earlier["talker-start"].message == "silent":
@@ -210,10 +212,6 @@ def talker_chatter(view: View, earlier: Earlier) -> Verdict:
     if near := next((endpoint.topic for endpoint in view.published if endpoint.type == topic.type), ""):
         return failed(check, "near-topic", near=near)
     return failed(check, "removed")
-
-
-def _sequel(view: View) -> Sequel | None:
-    return analyse(view.numbers, view.specification.number_topic.largest)
 
 
 def _unheard(check: str, view: View, earlier: Earlier) -> Verdict | None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable
 from functools import cached_property
+from typing import Any
 
 from lab2_grader import lab, messages, reading
+from lab2_grader.checks.sequence import Sequel, analyse
 from lab2_grader.records import (
     Build,
     EndedBy,
@@ -40,41 +42,19 @@ class SceneView:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.endpoints: list[Endpoint] = []
-        self.messages: list[Message] = []
-        self.lines: list[Line] = []
-        self.sent: list[Sent] = []
-        self.seen: list[ProcessSeen] = []
-        self.gone: list[ProcessGone] = []
-        self.unsupported: list[Unsupported] = []
-        self.measured: dict[str, float] = {}
-        self.phases: dict[str, float] = {}
-        self.ended: ProgramEnded | None = None
+        kinds: dict[type[Event], list[Any]] = defaultdict(list)
         for event in scene.events:
-            self._sort(event)
-
-    def _sort(self, event: Event) -> None:
-        match event:
-            case Message():
-                self.messages.append(event)
-            case Line():
-                self.lines.append(event)
-            case Endpoint():
-                self.endpoints.append(event)
-            case Sent():
-                self.sent.append(event)
-            case ProcessSeen():
-                self.seen.append(event)
-            case ProcessGone():
-                self.gone.append(event)
-            case Measured():
-                self.measured[event.name] = event.value
-            case Phase():
-                self.phases[event.name] = event.at
-            case ProgramEnded():
-                self.ended = event
-            case Unsupported():
-                self.unsupported.append(event)
+            kinds[type(event)].append(event)
+        self.endpoints: list[Endpoint] = kinds[Endpoint]
+        self.messages: list[Message] = kinds[Message]
+        self.lines: list[Line] = kinds[Line]
+        self.sent: list[Sent] = kinds[Sent]
+        self.seen: list[ProcessSeen] = kinds[ProcessSeen]
+        self.gone: list[ProcessGone] = kinds[ProcessGone]
+        self.unsupported: list[Unsupported] = kinds[Unsupported]
+        self.measured: dict[str, float] = {event.name: event.value for event in kinds[Measured]}
+        self.phases: dict[str, float] = {event.name: event.at for event in kinds[Phase]}
+        self.ended: ProgramEnded | None = kinds[ProgramEnded][-1] if kinds[ProgramEnded] else None
 
     def appeared(self, kind: str) -> list[Endpoint]:
         """The publishers, or the subscriptions, that appeared."""
@@ -235,6 +215,11 @@ class View:
         """What the talker published as its count, wherever it did."""
         topic = self.stray_number_topic or self.specification.number_topic.name
         return [message for message in self.talking.messages if message.topic == topic] if self.talking else []
+
+    @cached_property
+    def sequel(self) -> Sequel | None:
+        """The numbers taken apart; None when one of them is no whole number."""
+        return analyse(self.numbers, self.specification.number_topic.largest)
 
     @cached_property
     def texts(self) -> list[Message]:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 
 from lab2_grader import pipeline
 from lab2_grader.classroom import results, summary
+from lab2_grader.classroom.pool import cores
 from lab2_grader.errors import Lab2Error, UsageError
 from lab2_grader.lab import Rubric
 from lab2_grader.records import ClassState, Record, Result
+
+WORTH_A_POOL = 50  # submissions: starting processes takes as long as judging so many
+AT_A_TIME = 20  # submissions handed to a process
 
 
 class Change(Record, frozen=True):
@@ -32,7 +39,7 @@ def rescore(root: Path, rubric: Rubric) -> Remarked:
     """Judge what is recorded in *root* again: a result's folder, or a folder of such folders.
 
     All are judged before the first is written, so that an interruption leaves either mark, and never half a class
-    without the table of changes.
+    without the table of changes. Reports are written where the result is another one now; the others stand.
 
     Raises:
         UsageError: There is no evidence in *root*, or somebody else is writing there.
@@ -50,22 +57,31 @@ def rescore(root: Path, rubric: Rubric) -> Remarked:
 
 
 def _rescore(folders: list[Path], rubric: Rubric) -> Remarked:
-    judged: list[tuple[Path, Result]] = []
-    failed: list[tuple[str, str]] = []
-    changes: list[Change] = []
-    for folder in folders:
-        try:
-            result = pipeline.rescore(folder, rubric)
-        except Lab2Error as error:
-            failed.append((folder.name, str(error)))
-            continue
-        judged.append((folder, result))
-        change = _change(folder.name, results.result(folder), result)
-        if change is not None:
-            changes.append(change)
-    for folder, result in judged:
-        pipeline.write_reports(folder, result)
-    return Remarked(len(judged), tuple(changes), tuple(failed))
+    if len(folders) < WORTH_A_POOL:
+        return _written(map(partial(_judged, rubric=rubric), folders))
+    with ProcessPoolExecutor(cores()) as pool:
+        return _written(pool.map(partial(_judged, rubric=rubric), folders, chunksize=AT_A_TIME))
+
+
+def _judged(folder: Path, rubric: Rubric) -> tuple[Path, Result | None, Change | None, str]:
+    """(folder, the result where it is another one now, how the mark changed, why it could not be judged)."""
+    try:
+        result = pipeline.rescore(folder, rubric)
+    except Lab2Error as error:
+        return folder, None, None, str(error)
+    if results.stands(folder, result):
+        return folder, None, None, ""
+    return folder, result, _change(folder.name, results.result(folder), result), ""
+
+
+def _written(judged: Iterable[tuple[Path, Result | None, Change | None, str]]) -> Remarked:
+    rows = list(judged)
+    for folder, result, _, _ in rows:
+        if result is not None:
+            pipeline.write_reports(folder, result)
+    failed = tuple((folder.name, why) for folder, _, _, why in rows if why)
+    changes = tuple(change for _, _, change, _ in rows if change is not None)
+    return Remarked(len(rows) - len(failed), changes, failed)
 
 
 def _change(name: str, old: Result | None, new: Result) -> Change | None:

@@ -89,6 +89,15 @@ def result(folder: Path) -> Result | None:
         return None
 
 
+def stands(folder: Path, result: Result) -> bool:
+    """Whether exactly *result* is written in *folder*, with its reports."""
+    try:
+        written = (folder / report.RESULT).read_bytes()
+    except OSError:
+        return False
+    return written == evidence.pretty(result) and all((folder / name).is_file() for name in report.NAMES)
+
+
 def current(folder: Path, key: str, rubric: Rubric) -> Result | None:
     """The result in *folder* when it is that of *key*, whole, and has a mark; judged again when only the rubric changed."""
     known, found = stamp(folder), result(folder)

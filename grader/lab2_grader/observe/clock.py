@@ -29,7 +29,7 @@ TARDY_LIMIT = 5
 REAL_TIME_HERTZ = 20
 HELD_SECONDS = 5.0  # a held node is let go before the middleware takes it for dead
 
-OnNumber = Callable[[Message], None]
+OnNumber = Callable[[Message], bool]
 
 
 class LockStep:
@@ -39,8 +39,8 @@ class LockStep:
         observer: Hears what the talker publishes.
         clock: TIME_LAPSE to drive the ROS clock, REAL_TIME to leave it alone.
         talker: The executable that ticks; once it has ended there is nothing to wait for.
-        listener: The executable that only listens, if there is one. It is held during the fast part under the ROS clock,
-            which is about the talker alone, and takes half as long without it.
+        listener: The executable that only listens, if there is one. Once it has answered all it was asked, it is held during
+            the fast part under the ROS clock, which is about the talker alone and takes half as long without it.
     """
 
     def __init__(self, observer: Observer, clock: Clock, talker: str, listener: str = "") -> None:
@@ -66,8 +66,10 @@ class LockStep:
 
         Args:
             topic: Where the numbers are expected.
-            on_slow: Called with each number of the slow part, before the next tick; None for no slow part.
+            on_slow: Called with each number of the slow part, before the next tick, and says whether it was answered; None for
+                no slow part.
         """
+        answered = True
         number_topic = lab.specification().number_topic
         length = number_topic.largest - number_topic.smallest + 1
         self._topic = topic
@@ -85,11 +87,11 @@ class LockStep:
                     return
                 numbers = self._heard()
                 if numbers:
-                    on_slow(numbers[-1])
+                    answered = on_slow(numbers[-1]) and answered
         self._phase("fast")
         held_until = time.monotonic() + HELD_SECONDS
         with self._hold:
-            if self._follows and self._listener:
+            if self._follows and self._listener and answered:
                 self._hold.enter_context(self._observer.held(self._listener))
             while self._next_tick():
                 wanted = length * self._limits.wraps + length // 8 if self._follows else length + 4

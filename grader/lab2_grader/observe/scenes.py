@@ -106,12 +106,13 @@ def _conversation(observer: Observer, plan: ScenePlan) -> None:
         observer.until(lambda: steps.followers() >= len(observer.nodes()), lab.limits().start.settle_seconds)
     ear = _Ear(observer, plan.listener, limits.answer_seconds)
 
-    def answer(message: Message) -> None:
-        if isinstance(message.data, int):
-            number = message.data
-            since = max(0, len(observer.lines) - RECENT)
-            greetings = [str(m.data) for m in observer.messages[-RECENT:] if m.topic == specification.text_topic.name]
-            ear.hears(lambda line: number in numbers_in(line, greetings), since)
+    def answer(message: Message) -> bool:
+        number = message.data
+        if not isinstance(number, int):
+            return False
+        since = max(0, len(observer.lines) - RECENT)
+        greetings = [str(m.data) for m in observer.messages[-RECENT:] if m.topic == specification.text_topic.name]
+        return ear.hears(lambda line: number in numbers_in(line, greetings), since)
 
     if observer.alive():
         steps.play(_number_topic(observer), answer)

@@ -17,9 +17,10 @@ from lab2_grader.report.junit import junit
 from lab2_grader.report.markdown import markdown
 from lab2_grader.report.view import Audience, Report, report_of
 
-__all__ = ["FORMATS", "RESULT", "Audience", "Report", "as_json", "files", "report_of"]
+__all__ = ["FORMATS", "NAMES", "RESULT", "Audience", "Report", "as_json", "files", "report_of"]
 
 RESULT = "result.json"
+NAMES = ("report.html", "report.md", "junit.xml", "staff.html", RESULT)  # what `files` makes
 
 
 def as_json(report: Report) -> str:
@@ -40,13 +41,8 @@ FORMATS: Mapping[str, Callable[[Report], str]] = {
 def files(result: Result, evidence: Evidence) -> tuple[tuple[str, bytes], ...]:
     """(name, content) of every file that a result is written to; `staff.html` and `result.json` are not for students."""
     student, staff = report_of(result, evidence), report_of(result, evidence, Audience.STAFF)
-    return (
-        ("report.html", _bytes(html(student))),
-        ("report.md", _bytes(markdown(student))),
-        ("junit.xml", _bytes(junit(student))),
-        ("staff.html", _bytes(html(staff))),
-        (RESULT, _bytes(as_json(staff))),
-    )
+    texts = (html(student), markdown(student), junit(student), html(staff), as_json(staff))
+    return tuple((name, _bytes(text)) for name, text in zip(NAMES, texts, strict=True))
 
 
 def _bytes(text: str) -> bytes:
