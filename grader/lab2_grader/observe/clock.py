@@ -168,7 +168,7 @@ class LockStep:
         self._jump()
         shortest, longest = PROBE_WAIT_SECONDS
         answer = longest  # how soon the talker answers, at its best
-        intervals = []
+        intervals: list[int] = []
         took = 0.0
         for _ in range(3):
             before, began, probes = len(self._heard()), time.monotonic(), 0
