@@ -43,7 +43,17 @@ T = TypeVar("T")
 
 
 class SceneEntry(Record, frozen=True):
-    """What the manifest says of a scene; its events are in a file of their own. Fields as in `Scene`."""
+    """What the manifest says of a scene; its events are in a file of their own. Fields as in `Scene`.
+
+    Args:
+        name: Which scene.
+        started_with: `launch`, `executable` or `module`.
+        label: The executable or module that ran by itself; empty for a launch.
+        clock: How its clock was driven.
+        complete: The observer came to the end of its script.
+        fault: Why it did not, in a sentence; else empty.
+        seconds: How long the scene took.
+    """
 
     name: SceneName
     started_with: str
@@ -55,7 +65,17 @@ class SceneEntry(Record, frozen=True):
 
 
 class Manifest(Record, frozen=True):
-    """The table of contents of a folder of evidence; `finished` is false while the submission is still being run."""
+    """The table of contents of a folder of evidence; `finished` is false while the submission is still being run.
+
+    Args:
+        schema: Always `EVIDENCE_SCHEMA`.
+        finished: False while the submission is still being run.
+        runtime: With what it is run.
+        seconds: How long the stages took.
+        faults: What failed on the grader's or the machine's side, in sentences.
+        scenes: The scenes that were played.
+        began: When the grading began, UTC, ISO 8601.
+    """
 
     schema: str
     finished: bool

@@ -104,7 +104,12 @@ class Outcome(Record, frozen=True):
 
 
 class SourceFile(Record, frozen=True):
-    """A text file of the package, kept so that hints can name lines; `path` is relative to the package."""
+    """A text file of the package, kept so that hints can name lines; `path` is relative to the package.
+
+    Args:
+        path: Relative to the package.
+        text: What stands in it, cut at the limit.
+    """
 
     path: str
     text: str
@@ -172,7 +177,12 @@ class Submission(Record, frozen=True):
 
 
 class EntryPoint(Record, frozen=True):
-    """One line of `console_scripts`: `name = target`."""
+    """One line of `console_scripts`: `name = target`.
+
+    Args:
+        name: What `ros2 run` calls it.
+        target: package.module:function, as it stands in setup.py.
+    """
 
     name: str
     target: str
@@ -228,7 +238,12 @@ class Clock(str, Enum):
 
 
 class Phase(Row, frozen=True):
-    """A part of the scene begins: `start`, `graph`, `period`, `slow`, `fast`, `real-time`, `send <topic>`, `stop`."""
+    """A part of the scene begins: `start`, `graph`, `period`, `slow`, `fast`, `real-time`, `send <topic>`, `stop`.
+
+    Args:
+        at: When it begins.
+        name: Which part.
+    """
 
     at: float
     name: str
@@ -298,14 +313,25 @@ class Line(Row, frozen=True):
 
 
 class Tick(Row, frozen=True):
-    """The grader moved the ROS clock; `clock` is its new time, in seconds."""
+    """The grader moved the ROS clock; `clock` is its new time, in seconds.
+
+    Args:
+        at: When it was moved.
+        clock: The ROS time it was set to, in seconds.
+    """
 
     at: float
     clock: float
 
 
 class Sent(Row, frozen=True):
-    """The grader published a message of its own."""
+    """The grader published a message of its own.
+
+    Args:
+        at: When it was published.
+        topic: Fully qualified name of the topic.
+        data: Its `data` field.
+    """
 
     at: float
     topic: str
@@ -313,7 +339,14 @@ class Sent(Row, frozen=True):
 
 
 class ProcessSeen(Row, frozen=True):
-    """A process of the submission was seen running; `executable` is its name when it is one of the package's, else empty."""
+    """A process of the submission was seen running; `executable` is its name when it is one of the package's, else empty.
+
+    Args:
+        at: When it was seen first.
+        pid: Its process id, as the grader sees it.
+        executable: Name of the package's executable that it is, else empty.
+        command: Its command line, cleaned and cut.
+    """
 
     at: float
     pid: int
@@ -322,7 +355,13 @@ class ProcessSeen(Row, frozen=True):
 
 
 class ProcessGone(Row, frozen=True):
-    """A process seen before is no longer there; `by` says whether it ended by itself or the scene was being stopped."""
+    """A process seen before is no longer there; `by` says whether it ended by itself or the scene was being stopped.
+
+    Args:
+        at: When it was found gone.
+        pid: Its process id, as the grader sees it.
+        by: Whether it ended by itself or the scene was being stopped.
+    """
 
     at: float
     pid: int
@@ -352,6 +391,11 @@ class Measured(Row, frozen=True):
 
     `graph_seconds`, `period_seconds`, `follows_ros_clock` (1 or 0), and what was more than is kept: `dropped_bytes`,
     `dropped_lines`, `dropped_messages`.
+
+    Args:
+        at: When it was known.
+        name: What was measured.
+        value: Seconds, a count, or 1 for yes and 0 for no.
     """
 
     at: float
@@ -360,7 +404,12 @@ class Measured(Row, frozen=True):
 
 
 class Unsupported(Row, frozen=True):
-    """Our own launcher met something of the launch API that it does not know: our limit, not the student's fault."""
+    """Our own launcher met something of the launch API that it does not know: our limit, not the student's fault.
+
+    Args:
+        at: When it said so.
+        what: The name in the launch API.
+    """
 
     at: float
     what: str
@@ -449,7 +498,13 @@ class Runtime(Record, frozen=True):
 
 
 class Seconds(Record, frozen=True):
-    """How long the stages took; `run` is all scenes, side by side."""
+    """How long the stages took; `run` is all scenes, side by side.
+
+    Args:
+        build: Of `colcon build`.
+        run: Of all scenes together, side by side.
+        total: From the start to the judgement.
+    """
 
     build: float
     run: float
@@ -525,7 +580,25 @@ class Verdict(Record, frozen=True):
 
 
 class CheckResult(Record, frozen=True):
-    """A verdict with its points, as `result.json` has it."""
+    """A verdict with its points, as `result.json` has it.
+
+    Args:
+        id: Its id: a contract, never changed.
+        item: The item of the checklist that it serves.
+        title: What it asks, for people.
+        status: The verdict.
+        points: Points given.
+        max_points: Points that it could give; 0 when it was not assessed.
+        expected: What is asked, in a sentence.
+        observed: What was seen instead; empty when it passed.
+        hint: What to do next; empty when it passed.
+        section: Section of the worksheet.
+        message: Key of the fault in the catalogue of messages; empty when it passed.
+        symptom: Row of the worksheet's troubleshooting table that fits, else empty.
+        because: Checks that had to pass first, when it is blocked.
+        file: File of the package that the hint is about, else empty.
+        line: Line in that file, from 1; 0 for none.
+    """
 
     id: str
     item: str
@@ -545,7 +618,15 @@ class CheckResult(Record, frozen=True):
 
 
 class ItemResult(Record, frozen=True):
-    """An item of the worksheet's checklist with the points of its checks."""
+    """An item of the worksheet's checklist with the points of its checks.
+
+    Args:
+        item: Its id in the rubric.
+        text: Its sentence in the worksheet (6.8).
+        status: `pass` when all its checks passed, `partial` when some did, `blocked` when nothing but that is left.
+        points: Points of its checks together.
+        max_points: Points that its checks could give.
+    """
 
     item: str
     text: str
@@ -555,7 +636,14 @@ class ItemResult(Record, frozen=True):
 
 
 class SubmissionResult(Record, frozen=True):
-    """The submission as `result.json` names it."""
+    """The submission as `result.json` names it.
+
+    Args:
+        name: A short name for people.
+        source: What the grader was given: a path or an address, without secrets.
+        sha256: Digest over the names and contents of the package's files.
+        commit: Full commit id when it is a git repository, else None.
+    """
 
     name: str
     source: str
@@ -564,7 +652,13 @@ class SubmissionResult(Record, frozen=True):
 
 
 class Digests(Record, frozen=True):
-    """SHA-256 of what the result was made from, hexadecimal."""
+    """SHA-256 of what the result was made from, hexadecimal.
+
+    Args:
+        submission: Of the package's files.
+        evidence: Of the files of the evidence.
+        rubric: Of the rubric it was marked by.
+    """
 
     submission: str
     evidence: str
@@ -607,7 +701,12 @@ class Result(Record, frozen=True):
 
 
 class Unknown(Record, frozen=True):
-    """Something in the inbox that is not graded, and why."""
+    """Something in the inbox that is not graded, and why.
+
+    Args:
+        what: Its name in the inbox.
+        reason: Why it is not graded.
+    """
 
     what: str
     reason: str
@@ -681,7 +780,13 @@ class ClassLine(Record, frozen=True):
 
 
 class CommonFault(Record, frozen=True):
-    """A way in which a check was missed, how many did, and one of the observations."""
+    """A way in which a check was missed, how many did, and one of the observations.
+
+    Args:
+        message: Key of the fault.
+        count: Submissions that have it.
+        example: What was observed in one of them.
+    """
 
     message: str
     count: int
@@ -689,7 +794,16 @@ class CommonFault(Record, frozen=True):
 
 
 class CheckRate(Record, frozen=True):
-    """How a class did in one check; `judged` leaves out what was not assessed or inconclusive."""
+    """How a class did in one check; `judged` leaves out what was not assessed or inconclusive.
+
+    Args:
+        id: Of the check.
+        title: What it asks, for people.
+        section: Section of the worksheet.
+        passed: Submissions that passed it.
+        judged: Submissions in which it could be judged.
+        faults: The commonest faults, most frequent first.
+    """
 
     id: str
     title: str

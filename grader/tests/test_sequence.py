@@ -20,7 +20,7 @@ def said(data: Iterable[int | float | str], missed: Iterable[int] = ()) -> list[
 
 
 def taken_apart(data: Iterable[int | float | str], missed: Iterable[int] = ()) -> Sequel:
-    sequel = analyse(said(data, missed), 127)
+    sequel = analyse(said(data, missed), 0, 127)
     assert sequel is not None
     return sequel
 
@@ -70,6 +70,13 @@ def test_overflow_is_one_return() -> None:
     assert not sequel.irregular
 
 
+@pytest.mark.parametrize("slipped", [[-128], [-128, -127, -126]])
+def test_set_back_too_late_is_one_fault(slipped: list[int]) -> None:
+    sequel = taken_apart([*range(128), *slipped, *range(100)])
+    assert [(step.before, step.after) for step in sequel.returns] == [(127, -128)]
+    assert not sequel.irregular
+
+
 def test_staying_at_the_largest() -> None:
     sequel = taken_apart([*range(128), 127, 127, 127])
     assert len(sequel.stays) == 3 and not sequel.irregular and not sequel.returns
@@ -77,14 +84,14 @@ def test_staying_at_the_largest() -> None:
 
 def test_a_restarted_publisher_counts_from_one_again() -> None:
     messages = said(range(5)) + said(range(5))
-    sequel = analyse(messages, 127)
+    sequel = analyse(messages, 0, 127)
     assert sequel is not None and sequel.first_number == 1
     assert [(step.before, step.after) for step in sequel.returns] == [(4, 0)]
 
 
 def test_a_middleware_that_does_not_number_its_messages() -> None:
     messages = [Message(i / 2, TOPIC, TYPE, 0, value) for i, value in enumerate(COUNT)]
-    sequel = analyse(messages, 127)
+    sequel = analyse(messages, 0, 127)
     assert sequel is not None and not sequel.irregular and len(sequel.returns) == 2 and sequel.first_number == 1
 
 
@@ -96,7 +103,7 @@ def test_whole_numbers(data: float | str | None, value: int | None) -> None:
 
 
 def test_words_are_no_sequence() -> None:
-    assert analyse(said(["Number: 1", "Number: 2"]), 127) is None
+    assert analyse(said(["Number: 1", "Number: 2"]), 0, 127) is None
     assert taken_apart(["0", "1", "2"]).values == (0, 1, 2)
 
 

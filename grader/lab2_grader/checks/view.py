@@ -219,7 +219,8 @@ class View:
     @cached_property
     def sequel(self) -> Sequel | None:
         """The numbers taken apart; None when one of them is no whole number."""
-        return analyse(self.numbers, self.specification.number_topic.largest)
+        topic = self.specification.number_topic
+        return analyse(self.numbers, topic.smallest, topic.largest)
 
     @cached_property
     def texts(self) -> list[Message]:

@@ -186,13 +186,12 @@ class LockStep:
                 self._wait(before, patience)
             intervals.append(probes)
             took = time.monotonic() - began
-        # The interval after the first jump may be short of a whole period, so it does not count.
-        self._period = round(max(intervals[1:]) * PROBE_SECONDS, 6)
+        # The interval after the first jump may be short of a whole period, so it does not count. A late answer makes one look
+        # longer, never shorter. A step that is too long would let a timer fire twice, one that is too short only not at all.
+        self._period = round(min(intervals[1:]) * PROBE_SECONDS, 6)
         self._follows = self._stands_still(max(HOLD_SECONDS, 1.5 * took))
         self._record("follows_ros_clock", float(self._follows))
-        # A late answer makes an interval look longer, never shorter: the shorter is nearer to the truth.
-        measured = round(min(intervals[1:]) * PROBE_SECONDS, 6)
-        self._record("period_seconds", measured if self._follows else round(took, 2))
+        self._record("period_seconds", self._period if self._follows else round(took, 2))
         return True
 
     def _jump(self) -> None:
