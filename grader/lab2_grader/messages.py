@@ -118,6 +118,8 @@ def limits() -> dict[str, Value]:
         "file_size": resources.file_bytes // 1_000_000,
         "disk": build.disk_bytes // 1_000_000,
         "scratch": resources.scratch_bytes // 1_000_000,
+        "output": resources.output_bytes // 1_000_000,
+        "lines": resources.lines,
         "install": build.install_bytes // 1_000_000,
         "files": build.files,
     }

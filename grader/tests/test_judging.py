@@ -105,7 +105,11 @@ BUILDS: dict[tuple[str, str], dict[str, object]] = {
     ("package-builds", f"limit-{limit}"): {"ok": False, "code": None, "ended_by": EndedBy.LIMIT, "limit": limit}
     for limit in LIMITS
 }
-BY_HAND = (*BUILDS, ("launch-conversation", "strangers"), ("originals-kept", "strangers"))
+FLOODED = {
+    ("launch-conversation", "flood"): SceneName.CONVERSATION,
+    ("listener-numeric", "flood"): SceneName.LISTENER,
+}
+BY_HAND = (*BUILDS, *FLOODED, ("launch-conversation", "strangers"), ("originals-kept", "strangers"))
 
 
 @pytest.mark.parametrize(("check", "key"), BUILDS)
@@ -126,6 +130,20 @@ def test_what_another_process_says_is_not_theirs(check: str, scene: SceneName, s
 
     found = verdicts(with_events(solution, scene, strange))
     assert (found[check].status, found[check].message) == (Status.FAIL, "strangers")
+
+
+@pytest.mark.parametrize(("check", "key"), FLOODED)
+def test_what_drowned_in_a_flood_is_said_to_have(check: str, key: str, solution: Evidence) -> None:
+    scene = FLOODED[check, key]
+
+    def without_answers(event: Event) -> Event | None:
+        return None if isinstance(event, Line) and event.source == "numeric_listener" else event
+
+    silent = with_events(solution, scene, without_answers)
+    assert verdicts(silent)[check].message == "silent"
+    dropped = Measured(9.0, "dropped_lines", 100_000)
+    flooded = with_scene(silent, scene, lambda scene: msgspec.structs.replace(scene, events=(*scene.events, dropped)))
+    assert (verdicts(flooded)[check].status, verdicts(flooded)[check].message) == (Status.FAIL, key)
 
 
 # --- whose fault it is ------------------------------------------------------------------------------------

@@ -226,7 +226,12 @@ def _combine(pair: Pair) -> Animal:
     """Both edits; a check that fails in one of them fails, one that is only blocked stays blocked."""
     one, other = (animals()[name] for name in pair.of)
     fails = one.fails | other.fails
-    blocked = {check: because for check, because in (one.blocked | other.blocked).items() if check not in fails}
+    # Where both block a check, whichever is looked at first is named.
+    blocked = {
+        check: " or ".join(filter(None, (one.blocked.get(check), other.blocked.get(check))))
+        for check in one.blocked | other.blocked
+        if check not in fails
+    }
     return Animal(
         name=f"{one.name}+{other.name}",
         about=f"{one.about}; {other.about}",

@@ -69,7 +69,9 @@ def complaints(animal: Animal | Repository, checks: Iterable[CheckResult | Verdi
             if not (check.expected and check.observed and check.hint):
                 found.append(f"{seen} without words")
         elif (
-            check.status is Status.BLOCKED and isinstance(animal, Animal) and animal.blocked[name] not in check.because
+            check.status is Status.BLOCKED
+            and isinstance(animal, Animal)
+            and not set(animal.blocked[name].split(" or ")).intersection(check.because)
         ):
             found.append(f"{seen} instead of because of {animal.blocked[name]}")
     return found

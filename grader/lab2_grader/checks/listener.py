@@ -48,6 +48,8 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
         return blocked(check, "listener-chatter")
     if wrong := _unsuitable(check, topic.name, topic.type, view, scene):
         return wrong
+    if scene.flooded:
+        return failed(check, "flood", **messages.limits())
     if len(missing) > len(sent) // 2:
         if literal := next((line for line in scene.lines if LITERAL.search(line.text)), None):
             return failed(check, "no-f-string", shown=said(literal.text))

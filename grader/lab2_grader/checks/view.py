@@ -118,6 +118,11 @@ class SceneView:
         """What *executable* printed."""
         return [line for line in self.lines if line.source == executable]
 
+    @property
+    def flooded(self) -> bool:
+        """Whether so much was printed that not all of it was kept."""
+        return "dropped_lines" in self.measured or "dropped_bytes" in self.measured
+
     def says(self, source: str, *texts: str) -> bool:
         """Whether one of *texts* stands in what *source* printed."""
         return any(text in line.text for line in self.lines if line.source == source for text in texts)
