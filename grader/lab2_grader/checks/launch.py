@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from lab2_grader.checks import source
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
 from lab2_grader.checks.view import SceneView, View, names
-from lab2_grader.messages import limits
 from lab2_grader.near import nearest
 from lab2_grader.reading import numbers_in, said
 from lab2_grader.records import Message, SceneName, Status, Verdict
@@ -138,7 +137,7 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
     if not spoken:
         return failed(check, "nothing")
     if scene.flooded:
-        return failed(check, "flood", **limits())
+        return failed(check, "flood")
     shown = ", ".join(str(message.data) for message in spoken[:5]) + (" …" if len(spoken) > 5 else "")
     return failed(check, "silent", shown=shown, printed=len(answered), count=len(spoken))
 

@@ -49,7 +49,7 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
     if wrong := _unsuitable(check, topic.name, topic.type, view, scene):
         return wrong
     if scene.flooded:
-        return failed(check, "flood", **messages.limits())
+        return failed(check, "flood")
     if len(missing) > len(sent) // 2:
         if literal := next((line for line in scene.lines if LITERAL.search(line.text)), None):
             return failed(check, "no-f-string", shown=said(literal.text))
