@@ -48,6 +48,7 @@ QUEUE_DEPTH = 1000  # the observer never loses what it could have heard
 GRAPH_SHARE = 5  # at most one part in so many of the observer's time goes into looking at the graph
 GRAPH_POLL_SECONDS = 0.02
 PROCESS_POLL_SECONDS = 0.1
+IDLE_SECONDS = 0.5  # a program that is busy for longer is left alone
 QUICK_PROCESS_POLL_SECONDS = 0.04  # until the first message: what dies at once must have been seen
 UNNAMED = "_NODE_NAME_UNKNOWN_"  # the node of an endpoint whose participant has not said its names yet
 UNNAMED_SECONDS = 1.0  # it is waited for so long
@@ -152,8 +153,12 @@ class Observer:
         return frozenset(filter(None, self._processes.values()))
 
     def held(self, executable: str) -> contextlib.AbstractContextManager[None]:
-        """Keep the processes of *executable* from running until the block ends."""
-        return process.held([pid for pid, name in self._processes.items() if name == executable])
+        """Keep the processes of *executable* from running until the block ends.
+
+        Only once nothing of the program has work to do, so that what it was about to print has been printed.
+        """
+        idle = self.until(lambda: not process.busy(self._table), IDLE_SECONDS)
+        return process.held([pid for pid, name in self._processes.items() if name == executable and idle])
 
     def _look_at_processes(self) -> None:
         if self._program is None:
