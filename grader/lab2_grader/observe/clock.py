@@ -54,6 +54,7 @@ class LockStep:
         self._period = 0.0
         self._tardy = 0
         self._advanced_at = 0.0
+        self._ahead = 0.0  # of the last tick, in ROS time
         self._listener = listener
         self._hold = contextlib.ExitStack()
 
@@ -100,6 +101,12 @@ class LockStep:
                 if time.monotonic() > held_until:
                     self._hold.close()
 
+    def half_step(self) -> None:
+        """Move the clock by half a period, once after each tick: other timers than the talker's may be waiting for it."""
+        if self._follows and not self._ahead:
+            self._ahead = self._period / 2
+            self._advance(self._ahead)
+
     # --- ticks ------------------------------------------------------------------------------
 
     def _heard(self) -> list[Message]:
@@ -116,7 +123,8 @@ class LockStep:
             if now > self._deadline or now - began > self._silence() or not self._can_tick():
                 return False
             if self._follows:
-                self._advance(self._period)
+                self._advance(self._period - self._ahead)
+                self._ahead = 0.0
                 steps += 1
             self._wait(before, STEP_WAIT_SECONDS)
         if self._follows:

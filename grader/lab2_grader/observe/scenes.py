@@ -15,9 +15,9 @@ NO_NODE_SECONDS = 8.0  # a program that has done nothing for so long, and is no 
 WARM_UP_TRIES = 4
 WARM_UP_SECONDS = 0.5
 PARTIAL_LINE_SECONDS = 0.2
-PATIENCE = 2  # after so many answers in a row that did not come, the next are waited for only briefly
+PATIENCE = 2  # after so many answers that did not come, the next are waited for only while there is work going on
 MATCH_SECONDS = 3.0  # from a subscription in the graph to one that is matched; one that asks for more never is
-BRIEF_SECONDS = 0.15
+BRIEF_SECONDS = 0.15  # without any work
 LAST_WORD_SECONDS = 0.3  # after what was sent last, nothing happened for so long
 RECENT = 20  # lines and messages back that can belong to the tick that was just made
 
@@ -68,7 +68,7 @@ def _start(observer: Observer, plan: ScenePlan, wanted: frozenset[tuple[str, str
 
 
 class _Ear:
-    """Waits for what *source* prints, patiently at first and briefly once it has proved to be deaf."""
+    """Waits for what *source* prints, patiently at first, and no longer than it works once it has proved to be deaf."""
 
     def __init__(self, observer: Observer, source: str, seconds: float) -> None:
         self._observer = observer
@@ -76,20 +76,36 @@ class _Ear:
         self._seconds = seconds
         self._misses = 0
 
-    def hears(self, fits: Callable[[str], bool], since: int, seconds: float | None = None) -> bool:
-        """Whether a line after the first *since* fits, now or soon (within *seconds*, which then proves nothing)."""
+    def hears(
+        self,
+        fits: Callable[[str], bool],
+        since: int,
+        seconds: float | None = None,
+        nudge: Callable[[], None] = lambda: None,
+    ) -> bool:
+        """Whether a line after the first *since* fits, now or soon (within *seconds*, which then proves nothing).
+
+        *nudge* is called when nothing fits at once.
+        """
         lines = self._observer.lines
 
         def heard() -> bool:
             return any(line.source in (self._source, "ros2") and fits(line.text) for line in lines[since:])
 
-        patience = seconds or (self._seconds if self._misses < PATIENCE else BRIEF_SECONDS)
+        patience, began = seconds or self._seconds, time.monotonic()
+
+        def over() -> bool:
+            idle = min(self._observer.quiet_seconds, time.monotonic() - began)
+            deaf = seconds is None and self._misses >= PATIENCE
+            return heard() or not self._observer.alive() or (deaf and idle > BRIEF_SECONDS)
+
         if not self._observer.until(heard, min(patience, PARTIAL_LINE_SECONDS)):
             self._observer.finish_lines()
-            self._observer.until(lambda: heard() or not self._observer.alive(), patience)
+            nudge()
+            self._observer.until(over, patience)
         found = heard()
         if seconds is None:
-            self._misses = 0 if found else self._misses + 1
+            self._misses += not found
         return found
 
 
@@ -114,7 +130,7 @@ def _conversation(observer: Observer, plan: ScenePlan) -> None:
         heard = {str(m.data) for m in observer.messages[-RECENT:] if m.topic == specification.text_topic.name}
         # The text that goes with this number may be printed before it is heard here: it is taken to look like the others.
         greetings = heard | {NUMBER.sub(str(number), text) for text in heard}
-        return ear.hears(lambda line: number in numbers_in(line, greetings), since)
+        return ear.hears(lambda line: number in numbers_in(line, greetings), since, nudge=steps.half_step)
 
     if observer.alive():
         steps.play(_number_topic(observer), answer)
