@@ -24,7 +24,7 @@ ISOLATION ?= auto
 SOURCED := $(if $(and $(ROS_DISTRO),$(shell command -v ros2 2>/dev/null)),yes,)
 
 .PHONY: help setup setup-dev isolation browser grade grade-all rescore doctor worksheet gradescope release \
-	release-solutions test test-one test-slow lint format bench stress record clean lock
+	release-solutions test test-one test-slow lint format bench stress record formats clean lock
 
 help: ## list the commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
@@ -133,6 +133,9 @@ stress: setup-dev ## grade some animals again and again beside busy loops: TIMES
 
 record: setup-dev ## record anew the evidence that the tests of the checks judge
 	@PYTHONPATH=grader $(BIN)/python grader/tests/record_evidence.py
+
+formats: setup ## write grader/docs/formats.md anew: every field of results and evidence
+	@PYTHONPATH=grader $(BIN)/python grader/docs/make_formats.py > grader/docs/formats.md
 
 lock: setup-dev ## pin the dependencies anew: every *.in to its *.txt, with hashes
 	@for name in base sourced wheels dev dev-sourced; do \
