@@ -11,9 +11,7 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 def test_the_page_is_up_to_date() -> None:
     made = subprocess.run([sys.executable, DOCS / "make_formats.py"], capture_output=True, text=True, check=True).stdout
-    assert made == (DOCS / "formats.md").read_text(encoding="utf-8"), (
-        "run: make formats"
-    )
+    assert made == (DOCS / "formats.md").read_text(encoding="utf-8"), "run: make formats"
 
 
 def test_every_field_has_a_meaning() -> None:
