@@ -61,6 +61,7 @@ class Surroundings(Record, frozen=True):
         python: Which `python3` is first.
         python_has_rclpy: Whether it can import rclpy.
         isolation: Whether submissions can be isolated.
+        keeper: By what means the limits of a submission are kept, as a sentence.
         processes: How many the user may have; 0 for no limit.
         memory: Bytes that are free.
         disk: Bytes that are free where temporary files go.
@@ -85,6 +86,7 @@ class Surroundings(Record, frozen=True):
     python: str
     python_has_rclpy: bool
     isolation: sandbox.Isolation
+    keeper: str
     processes: int
     memory: int
     disk: int
@@ -143,6 +145,7 @@ def look_around(
         python=python,
         python_has_rclpy=bool(python) and _can_import_rclpy(python, variables),
         isolation=sandbox.probe(),
+        keeper=sandbox.limits_kept_by(),
         processes=_process_limit(),
         memory=_free_memory(),
         disk=shutil.disk_usage(tempfile.gettempdir()).free,
@@ -257,7 +260,13 @@ def examine(found: Surroundings) -> tuple[Finding, ...]:
         _finding("products", not found.products, folders=", ".join(found.products), first=" ".join(found.products)),
         _repository(found),
         _finding("ssh", bool(found.keys), keys=", ".join(found.keys)),
-        _finding("isolation", found.isolation.on, reason=found.isolation.reason, command=found.isolation.mend),
+        _finding(
+            "isolation",
+            found.isolation.on,
+            reason=found.isolation.reason,
+            command=found.isolation.mend,
+            keeper=found.keeper,
+        ),
         _limits(found),
     )
 

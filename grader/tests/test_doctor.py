@@ -34,6 +34,7 @@ WELL = Surroundings(
     python="/usr/bin/python3",
     python_has_rclpy=True,
     isolation=sandbox.Isolation(True),
+    keeper="The kernel keeps the limits.",
     processes=0,
     memory=8_000_000_000,
     disk=8_000_000_000,
