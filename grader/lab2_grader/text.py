@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 
 # Terminal sequences whole, so that no remains of them (`[31m`) are left; a string sequence only when it is closed, so
 # that an open one cannot swallow what follows.
@@ -20,7 +21,7 @@ _INVISIBLE = re.compile(
 _BLANKS = re.compile("[\t\n\x0b\x0c\r\x1c-\x1e\x85\u2028\u2029]")
 _LINE_ENDS = re.compile("\r\n?|[\x0b\x0c\x85\u2028\u2029]")
 _BLANKS_BUT_NEWLINE = re.compile("\t|\x1c|\x1d|\x1e")
-_NO_CHARACTER = re.compile("[\ud800-\udfff\ufffe\uffff]")
+_NO_CHARACTERS = ("Cs", "Cn")  # lone surrogates, and what Unicode has not assigned
 
 ELLIPSIS = "…"
 
@@ -29,7 +30,7 @@ def clean(text: str, limit: int, *, lines: bool = False) -> str:
     r"""*text* on one line, without anything invisible or executable by a terminal, at most *limit* characters long.
 
     Terminal sequences, control characters, bidirectional controls and other invisible formatting go; tabs and line ends
-    become spaces; lone surrogates become U+FFFD. What is too long ends in an ellipsis. It is not escaped for HTML,
+    become spaces; lone surrogates and unassigned characters become U+FFFD. What is too long ends in an ellipsis. It is not escaped for HTML,
     Markdown or a spreadsheet: that is the renderer's part.
 
     Args:
@@ -44,7 +45,7 @@ def clean(text: str, limit: int, *, lines: bool = False) -> str:
             text = "\n".join(_INVISIBLE.sub("", line) for line in text.split("\n"))
         else:
             text = _INVISIBLE.sub("", _BLANKS.sub(" ", text))
-        text = _NO_CHARACTER.sub("\ufffd", text)
+        text = "".join("\ufffd" if unicodedata.category(letter) in _NO_CHARACTERS else letter for letter in text)
     if len(text) > limit:
         text = text[: limit - 1] + ELLIPSIS
     return text

@@ -16,6 +16,15 @@ HOSTILE = Path(__file__).resolve().parent / "hostile"
 TEXTS = "texts.toml"
 
 
+# colcon reads what setup.py prints: what is printed besides the description would be no more than a build that fails.
+ASIDE = """
+import sys
+sys.stdout, _stdout = sys.stderr, sys.stdout
+{code}
+sys.stdout = _stdout
+"""
+
+
 class Animal(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A hostile submission, what it must get, and what must be seen of it.
 
@@ -68,6 +77,8 @@ class Animal(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             for name, value in values.items():
                 code = code.replace(f"@{name}@", value)
             assert "@" not in code or "@" in text.replace("@", "", 2), f"{self.name}: an unknown @NAME@ in {file}"
+            if file == "setup":
+                code = ASIDE.format(code=code.lstrip("\n"))
             path.write_text(code.lstrip("\n") + "\n" + path.read_text())
         return folder
 

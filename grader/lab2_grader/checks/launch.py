@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from lab2_grader import lab
 from lab2_grader.checks import source
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
 from lab2_grader.checks.view import SceneView, View, names
@@ -143,11 +144,15 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
 
 
 def _spoken(view: View, scene: SceneView) -> list[Message]:
-    """The numbers of the slow dozen; without one (the talker stopped before), all there were."""
+    """The numbers of the slow dozen; without one (the talker stopped before), all there were.
+
+    No more than were asked for: what came between the last answer and full speed may have been missed, rightly.
+    """
+    ticks = lab.limits().conversation.slow_ticks
     slow, fast = scene.phases.get("slow", 0.0), scene.phases.get("fast", float("inf"))
     topic = view.specification.number_topic.name
     numbers = [message for message in scene.messages if message.topic == topic and isinstance(message.data, int)]
-    return [message for message in numbers if slow <= message.at < fast] or numbers[:12]
+    return ([message for message in numbers if slow <= message.at < fast] or numbers)[:ticks]
 
 
 def _printed(view: View, scene: SceneView, spoken: list[Message]) -> frozenset[int]:
