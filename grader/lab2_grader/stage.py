@@ -204,11 +204,11 @@ class Stage:
             jobs.append(lambda started: (self._listener(build, installed, started),))
         with ThreadPoolExecutor(max_workers=len(jobs)) as pool:
             futures: list[Future[tuple[Scene, ...]]] = []
-            for job in jobs:
-                started = threading.Event()
-                futures.append(pool.submit(job, started))
-                started.wait(HEAD_START_SECONDS)
             try:
+                for job in jobs:
+                    started = threading.Event()
+                    futures.append(pool.submit(job, started))
+                    started.wait(HEAD_START_SECONDS)
                 scenes = {scene.name: scene for future in futures for scene in future.result()}
             except BaseException:
                 self._dismiss_all()
