@@ -21,9 +21,17 @@ _INVISIBLE = re.compile(
 _BLANKS = re.compile("[\t\n\x0b\x0c\r\x1c-\x1e\x85\u2028\u2029]")
 _LINE_ENDS = re.compile("\r\n?|[\x0b\x0c\x85\u2028\u2029]")
 _BLANKS_BUT_NEWLINE = re.compile("\t|\x1c|\x1d|\x1e")
+_JOINERS = "\u200c\u200d"
 _NO_CHARACTERS = ("Cs", "Cn")  # lone surrogates, and what Unicode has not assigned
 
 ELLIPSIS = "…"
+
+
+def _shown(letter: str) -> str:
+    category = unicodedata.category(letter)
+    if category in _NO_CHARACTERS:
+        return "\ufffd"
+    return "" if category == "Cf" and letter not in _JOINERS else letter
 
 
 def clean(text: str, limit: int, *, lines: bool = False) -> str:
@@ -45,7 +53,7 @@ def clean(text: str, limit: int, *, lines: bool = False) -> str:
             text = "\n".join(_INVISIBLE.sub("", line) for line in text.split("\n"))
         else:
             text = _INVISIBLE.sub("", _BLANKS.sub(" ", text))
-        text = "".join("\ufffd" if unicodedata.category(letter) in _NO_CHARACTERS else letter for letter in text)
+        text = "".join(_shown(letter) for letter in text)
     if len(text) > limit:
         text = text[: limit - 1] + ELLIPSIS
     return text
