@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import configparser
+import functools
 import io
 import shutil
 import sys
@@ -17,7 +18,7 @@ from pathlib import Path, PurePosixPath
 
 from lab2_grader import lab, process, sandbox
 from lab2_grader.errors import FaultError
-from lab2_grader.records import Build, EndedBy, EntryPoint, Request, Submission
+from lab2_grader.records import Build, EndedBy, EntryPoint, Outcome, Request, Submission
 from lab2_grader.ros import Ros
 from lab2_grader.text import clean
 
@@ -39,29 +40,18 @@ code=$?
 exit $code
 """
 
+# A package that builds wherever colcon works: when a submission does not build, it says whose fault that is.
+PROOF = "build_proof"
+
 
 def build(submission: Submission, into: Path, ros: Ros, isolation: sandbox.Isolation) -> Build:
     """Build *submission* and unpack what was installed below *into*.
 
     Raises:
-        FaultError: colcon is not there, or the machine failed.
+        FaultError: colcon is not there or does not build anything, or the machine failed.
     """
-    limits = lab.limits()
     package = lab.specification().package
-    workspace, source = (sandbox.WORKSPACE, PACKAGE_INSIDE) if isolation.on else (str(into), submission.package_dir)
-    environment = ros.environment(sandbox.HOME if isolation.on else str(into))
-    if shutil.which("colcon", path=dict(environment)["PATH"]) is None:
-        raise FaultError("colcon is not installed where the grader looks for it. Run `make setup`.", "build")
-    request = Request(
-        argv=("sh", "-c", SCRIPT, "build", workspace, source, package),
-        env=environment,
-        cwd="/",
-        limits=limits.resources.limits(limits.build.seconds, limits.build.install_bytes + limits.build.output_bytes),
-    )
-    mounts = (sandbox.Mount(submission.package_dir, PACKAGE_INSIDE), *(sandbox.Mount(path) for path in ros.reads()))
-    confined = sandbox.confine(request, mounts, isolation, network=False, workspace_bytes=limits.build.disk_bytes)
-    printed = _Printed(limits.build.install_bytes)
-    outcome = process.run(confined, printed)
+    outcome, printed = _colcon(submission.package_dir, package, into, ros, isolation)
     lines = printed.end.decode(errors="replace").splitlines()
     log = "\n".join(clean(line, 2_000) for line in lines)
     limit = outcome.limit or printed.limit or (_unpack(printed.archive, into) if printed.archive else "")
@@ -70,6 +60,8 @@ def build(submission: Submission, into: Path, ros: Ros, isolation: sandbox.Isola
     ended_by = EndedBy.LIMIT if limit and outcome.ended_by is EndedBy.ITSELF else outcome.ended_by
     prefix = into / "install" / package
     ok = outcome.code == 0 and not limit and prefix.is_dir()
+    if outcome.code != 0 and ended_by is EndedBy.ITSELF:
+        _prove(ros, isolation)
     return Build(
         ok=ok,
         code=outcome.code,
@@ -83,6 +75,44 @@ def build(submission: Submission, into: Path, ros: Ros, isolation: sandbox.Isola
         launch_files=_launch_files(prefix / "share" / package) if ok else (),
         dangling=_dangling(prefix, package) if ok else (),
     )
+
+
+def _colcon(
+    package_dir: str, package: str, into: Path, ros: Ros, isolation: sandbox.Isolation
+) -> tuple[Outcome, _Printed]:
+    """Build the package in *package_dir* where it does no harm (below *into* when there are no walls)."""
+    limits = lab.limits()
+    workspace, source = (sandbox.WORKSPACE, PACKAGE_INSIDE) if isolation.on else (str(into), package_dir)
+    environment = ros.environment(sandbox.HOME if isolation.on else str(into))
+    if shutil.which("colcon", path=dict(environment)["PATH"]) is None:
+        raise FaultError("colcon is not installed where the grader looks for it. Run `make setup`.", "build")
+    request = Request(
+        argv=("sh", "-c", SCRIPT, "build", workspace, source, package),
+        env=environment,
+        cwd="/",
+        limits=limits.resources.limits(limits.build.seconds, limits.build.install_bytes + limits.build.output_bytes),
+    )
+    mounts = (sandbox.Mount(package_dir, PACKAGE_INSIDE), *(sandbox.Mount(path) for path in ros.reads()))
+    confined = sandbox.confine(
+        request, mounts, isolation, network=False, workspace_bytes=limits.build.disk_bytes, needs="colcon"
+    )
+    printed = _Printed(limits.build.install_bytes)
+    return process.run(confined, printed), printed
+
+
+@functools.cache
+def _prove(ros: Ros, isolation: sandbox.Isolation) -> None:
+    """Build a package that is known to build, once with each ROS: a submission pays only for what is its own.
+
+    Raises:
+        FaultError: It does not build either.
+    """
+    with process.temporary_directory() as name:
+        outcome, printed = _colcon(str(Path(__file__).with_name(PROOF)), PROOF, Path(name), ros, isolation)
+    if outcome.code != 0:
+        lines = printed.end.decode(errors="replace").strip().splitlines()
+        said = clean(lines[-1], 300) if lines else f"exit code {outcome.code}"
+        raise FaultError(f"colcon does not build anything on this machine ({said}). Run `make setup`.", "build")
 
 
 class _Printed:

@@ -19,6 +19,7 @@ import selectors
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -35,6 +36,9 @@ CHUNK_BYTES = 65_536
 LAST_OUTPUT_SECONDS = 0.5  # how long output of an ended process is waited for
 PAGE_BYTES = resource.getpagesize()
 PR_SET_CHILD_SUBREAPER = 36
+
+# The Python that runs the grader, under the name by which the sandbox knows it too: without `..`, links not followed.
+PYTHON = os.path.abspath(sys.executable)  # noqa: PTH100 resolve() follows links, out of the virtual environment
 
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 

@@ -26,7 +26,12 @@ WORKSPACE = "/ws"
 
 # The first thing that happens inside: without it a failure was that of the walls, never of what stands within.
 ANNOUNCEMENT = "[lab2-grader] inside"
-ANNOUNCE = 'printf "%s\\n" "$0" >&2; exec "$@"'
+ANNOUNCE = """
+command -v "$1" >/dev/null || { echo "$1 is not found inside it" >&2; exit 127; }
+shift
+printf "%s\\n" "$0" >&2
+exec "$@"
+"""
 
 SYSTEM_FILES = (
     "/etc/alternatives",
@@ -105,6 +110,7 @@ def confine(
     isolation: Isolation,
     network: bool = True,
     workspace_bytes: int = 0,
+    needs: str = process.PYTHON,
 ) -> Request:
     """The inner wall: *request* sees the system's programs, *mounts* and private scratch space, and nothing else.
 
@@ -114,6 +120,7 @@ def confine(
         isolation: Whether walls can be had.
         network: Whether it shares the network of whoever starts it (the observer's private one).
         workspace_bytes: Size of a writable `WORKSPACE` of its own; 0 for none.
+        needs: The grader's own program that must be found inside; that it is not is a fault of the machine.
     """
     if not isolation.on:
         return request
@@ -143,7 +150,7 @@ def confine(
     for hidden in own_files():
         argv += ["--tmpfs", hidden, "--remount-ro", hidden]
     argv += ["--remount-ro", "/", "--chdir", request.cwd, "--"]
-    argv += ["sh", "-c", ANNOUNCE, ANNOUNCEMENT, *_few_processes(request.limits), *request.argv]
+    argv += ["sh", "-c", ANNOUNCE, ANNOUNCEMENT, needs, *_few_processes(request.limits), *request.argv]
     return msgspec.structs.replace(request, argv=tuple(argv), cwd="/", announces=ANNOUNCEMENT)
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import random
 import re
-import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -84,7 +83,7 @@ class _Observer:
         conversation = lab.limits().conversation
         seconds = conversation.realtime_seconds + conversation.timelapse_seconds + OBSERVER_GRACE_SECONDS
         request = Request(
-            argv=(sys.executable, "-m", "lab2_grader.observe"),
+            argv=(process.PYTHON, "-m", "lab2_grader.observe"),
             env=tuple(environment.items()),
             cwd="/",
             limits=Limits(
@@ -288,7 +287,7 @@ class Stage:
             path = f"{self._prefix(installed)}/lib/{package}/{found}"
             return how, found, self._confined((path, *ros_arguments), installed)
         if how == "module":
-            argv = (sys.executable, "-c", RUN_MODULE, f"{package}.{found}", *ros_arguments)
+            argv = (process.PYTHON, "-c", RUN_MODULE, f"{package}.{found}", *ros_arguments)
             return how, found, self._confined(argv, installed)
         return None
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from class_generator import KINDS, make
 
-from lab2_grader import lab, process
+from lab2_grader import lab, pipeline, process
 from lab2_grader.classroom import pool, remark, run
 from lab2_grader.records import ClassLine, ClassState
 
@@ -86,7 +86,7 @@ def measure(folder: Path, count: int, seed: int = 1, kind: str = "directories", 
 
 def rescore_per_second(out: Path, folder: Path, count: int = 1000) -> float:
     """How many recorded submissions are judged again in a second: those in *out*, copied to *folder* until they are *count*."""
-    recorded = sorted(path.parents[1] for path in out.glob("*/evidence/evidence.json"))
+    recorded = sorted(path.parent for path in out.glob(f"*/{pipeline.EVIDENCE}"))
     for number, source in zip(range(count), itertools.cycle(recorded)):
         shutil.copytree(source, folder / f"{number:04}")
     remark.rescore(folder, lab.rubric())  # what was recorded by another version of the grader is another result now

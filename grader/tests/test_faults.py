@@ -58,6 +58,40 @@ def test_colcon_is_missing(means: pipeline.Means, tmp_path: Path) -> None:
     assert json.loads((out / "result.json").read_text())["graded"] is False
 
 
+def test_colcon_is_half_installed(means: pipeline.Means, tmp_path: Path) -> None:
+    broken = tmp_path / "broken"
+    (broken / "colcon_core").mkdir(parents=True)
+    (broken / "colcon_core" / "__init__.py").write_text("raise ImportError('colcon_core is half installed')\n")
+    path = (str(broken), *means.ros.python_path)
+    prefixes = (*means.ros.prefixes, str(broken))  # so that it is seen inside
+    half = msgspec.structs.replace(means, ros=msgspec.structs.replace(means.ros, python_path=path, prefixes=prefixes))
+    result, _ = pipeline.grade(str(ROOT / "solution"), tmp_path / "out", half, lambda doing: None)
+    _is_withheld(result)
+    assert any("does not build anything" in note and "half installed" in note for note in result.notes)
+
+
+def test_colcon_is_not_found_inside_the_sandbox(means: pipeline.Means, tmp_path: Path) -> None:
+    _needs_walls(means)
+    outside = tmp_path / "bin"
+    outside.mkdir()
+    (outside / "colcon").symlink_to(Path(process.PYTHON).with_name("colcon"))
+    lost = msgspec.structs.replace(means, ros=msgspec.structs.replace(means.ros, path=(str(outside),)))
+    result, _ = pipeline.grade(str(ROOT / "solution"), tmp_path / "out", lost, lambda doing: None)
+    _is_withheld(result)
+    assert any("colcon is not found inside" in note for note in result.notes)
+
+
+def test_the_grader_is_called_by_a_roundabout_name_of_python(tmp_path: Path) -> None:
+    python = Path(process.PYTHON)
+    roundabout = str(python.parent / ".." / python.parent.name / python.name)
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "grader"), "PATH": os.defpath}
+    argv = [roundabout, *GRADER[1:], "grade", str(ROOT / "solution"), "--out", str(tmp_path / "out")]
+    done = subprocess.run(argv, env=environment, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert result["score"] == result["max_score"]
+
+
 def test_a_wheel_is_half_installed(means: pipeline.Means, tmp_path: Path) -> None:
     broken = tmp_path / "broken"
     (broken / "rclpy").mkdir(parents=True)

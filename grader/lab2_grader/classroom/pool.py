@@ -141,7 +141,7 @@ class Lanes(Generic[Item, Made]):
                     return
                 try:
                     done.put((self._step(item), None))
-                except BaseException as error:  # noqa: BLE001: handed over to the caller's thread
+                except BaseException as error:  # handed over to the caller's thread
                     done.put((None, error))
 
         threads = [threading.Thread(target=lane, name=f"lane-{n}") for n in range(min(self._count, len(items)))]

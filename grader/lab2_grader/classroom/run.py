@@ -159,7 +159,7 @@ class _Run:
             line = _line(entry, ClassState.WITHHELD, str(error))
         except StoppedError:
             raise
-        except Exception as error:  # noqa: BLE001: one submission never stops the class
+        except Exception as error:  # one submission never stops the class
             self._unless_stopped(error)
             self._log(entry.name)
             reason = f"the grader itself failed ({type(error).__name__}); see {FAULTS}"

@@ -11,7 +11,7 @@ import sys
 import sysconfig
 from pathlib import Path
 
-from lab2_grader import lab
+from lab2_grader import lab, process
 from lab2_grader.errors import FaultError, UsageError
 from lab2_grader.records import Record
 
@@ -94,7 +94,7 @@ class Ros(Record, frozen=True):
         """
         if not self.has_ros2_launch:
             follow = ("--use-sim-time",) if time_lapse else ()
-            return (sys.executable, str(LAUNCHER / "run.py"), *follow, package, launch_file)
+            return (process.PYTHON, str(LAUNCHER / "run.py"), *follow, package, launch_file)
         if time_lapse:
             return ("ros2", "launch", str(TIME_LAPSE_LAUNCH), f"launch_file:={path}")
         return ("ros2", "launch", package, launch_file)
@@ -154,7 +154,7 @@ def _sourced() -> Ros | None:
         prefixes=kept,
         python_path=_below(os.environ.get("PYTHONPATH", ""), kept),
         library_path=_below(os.environ.get("LD_LIBRARY_PATH", ""), kept),
-        path=(str(Path(program).parent), str(Path(sys.executable).parent)),
+        path=(str(Path(program).parent), str(Path(process.PYTHON).parent)),
         has_ros2_launch=True,
     )
 
@@ -175,6 +175,6 @@ def _wheels() -> Ros | None:
         prefixes=(sys.prefix,),
         python_path=(),
         library_path=libraries,
-        path=(str(Path(sys.executable).absolute().parent),),
+        path=(str(Path(process.PYTHON).parent),),
         has_ros2_launch=False,
     )
