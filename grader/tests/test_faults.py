@@ -6,6 +6,7 @@ The faults are real: a tiny disk, a read-only folder, a kernel that refuses name
 from __future__ import annotations
 
 import ast
+import io
 import json
 import os
 import signal
@@ -22,7 +23,9 @@ from zoo_builder import ROOT
 
 import lab2_grader
 from lab2_grader import pipeline, process
-from lab2_grader.records import Result, Status
+from lab2_grader.observe.observer import BLIND_SECONDS, Observer
+from lab2_grader.observe.recorder import Recorder
+from lab2_grader.records import Limits, Request, Result, Status
 from lab2_grader.sandbox import Isolation
 
 GRADER = (sys.executable, "-m", "lab2_grader")
@@ -102,6 +105,31 @@ def test_a_wheel_is_half_installed(means: pipeline.Means, tmp_path: Path) -> Non
     _is_withheld(result)
     assert any("librcl.so" in note for note in result.notes)
     assert json.loads((out / "result.json").read_text())["score"] is None
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of what rclpy imports
+def test_time_in_which_the_observer_did_not_look_does_not_count_as_quiet(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Slow(process.Process):
+        """Is started by a machine that takes its time."""
+
+        def __init__(self, *arguments: object, **keywords: object) -> None:
+            time.sleep(3 * BLIND_SECONDS)
+            super().__init__(*arguments, **keywords)
+
+    monkeypatch.setattr(process, "Process", Slow)
+    observer = Observer(Recorder(io.BytesIO()))
+    try:
+        observer.start(Request(("sleep", "60"), process.environment("PATH"), "/", Limits(seconds=60)), "sleep")
+        assert observer.quiet_seconds < BLIND_SECONDS
+        observer.until(lambda: False, 2 * BLIND_SECONDS)
+        assert BLIND_SECONDS < observer.quiet_seconds < 3 * BLIND_SECONDS
+        before = observer.quiet_seconds
+        time.sleep(3 * BLIND_SECONDS)
+        assert observer.quiet_seconds == before
+        observer.spin(0.0)
+        assert observer.quiet_seconds < before + BLIND_SECONDS
+    finally:
+        observer.stop()
 
 
 def test_the_observer_is_killed_in_mid_scene(means: pipeline.Means, tmp_path: Path) -> None:

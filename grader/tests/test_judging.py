@@ -13,6 +13,7 @@ from record_evidence import DATA, RECORDED
 from zoo_runner import complaints
 
 from lab2_grader import checks, evidence, lab, score
+from lab2_grader.reading import numbers_in
 from lab2_grader.records import (
     EndedBy,
     Endpoint,
@@ -130,6 +131,27 @@ def test_what_another_process_says_is_not_theirs(check: str, scene: SceneName, s
 
     found = verdicts(with_events(solution, scene, strange))
     assert (found[check].status, found[check].message) == (Status.FAIL, "strangers")
+
+
+@pytest.mark.parametrize(
+    ("name", "late", "expected"),
+    [
+        ("sleep-loop-fast", 60.0, (Status.INCONCLUSIVE, "inconclusive-behind")),
+        ("sleep-loop-fast", 0.0, (Status.FAIL, "silent")),
+        ("solution", 60.0, (Status.FAIL, "silent")),  # in lock-step nothing is sent before the answer to the last
+    ],
+)
+def test_a_number_that_a_busy_machine_may_have_lost_costs_nothing(
+    name: str, late: float, expected: tuple[Status, str], folder: Path
+) -> None:
+    def without_twelve(event: Event) -> Event | None:
+        if not isinstance(event, Line) or event.source != "numeric_listener":
+            return event
+        lost = numbers_in(event.text) == {12} and "World" not in event.text
+        return None if lost else msgspec.structs.replace(event, at=event.at + late)
+
+    found = verdicts(with_events(recorded(name, folder), SceneName.CONVERSATION, without_twelve))["launch-conversation"]
+    assert (found.status, found.message) == expected
 
 
 @pytest.mark.parametrize(("check", "key"), FLOODED)

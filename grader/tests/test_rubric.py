@@ -11,6 +11,7 @@ from lab2_grader import lab
 from lab2_grader.cli import main
 from lab2_grader.errors import UsageError
 
+POINTS = {check.id: f"points = {check.points}" for check in lab.rubric().check}
 OWN = (lab.FACTS / "rubric.toml").read_text(encoding="utf-8")
 
 
@@ -45,7 +46,7 @@ def refused(tmp_path: Path) -> Callable[[str], str]:
 
 def test_other_points_are_taken(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
-    path.write_text(replaced("points = 5", "points = 25", 'id = "package-builds"')(OWN), encoding="utf-8")
+    path.write_text(replaced(POINTS["package-builds"], "points = 25", 'id = "package-builds"')(OWN), encoding="utf-8")
     assert next(check.points for check in lab.rubric(path).check if check.id == "package-builds") == 25
     assert [check.id for check in lab.rubric(path).check] == [check.id for check in lab.rubric().check]
 
@@ -54,11 +55,11 @@ def test_other_points_are_taken(tmp_path: Path) -> None:
     ("change", "at", "says"),
     [
         (replaced("entry-points", "entry-point"), ('id = "entry-point"',), "there is no check entry-point. There are:"),
-        (replaced('"entry-points"', '"package-builds"'), ("points = 5", '"package-builds"'), "a second time"),
-        (replaced("points = 8", "points = 7.5", "entry-points"), ("entry-points", "points = 7.5"), "Expected `int`"),
-        (replaced("points = 8", 'points = "8"', "entry-points"), ("entry-points", 'points = "8"'), "Expected `int`"),
-        (replaced("points = 8", "points = -8", "entry-points"), ("entry-points", "points = -8"), "-8 points"),
-        (replaced("points = 8\n", "", "entry-points"), ('id = "entry-points"',), "missing required field `points`"),
+        (replaced('"entry-points"', '"package-builds"'), (POINTS["package-builds"], '"package-builds"'), "a second time"),
+        (replaced(POINTS["entry-points"], "points = 7.5", "entry-points"), ("entry-points", "points = 7.5"), "Expected `int`"),
+        (replaced(POINTS["entry-points"], 'points = "8"', "entry-points"), ("entry-points", 'points = "8"'), "Expected `int`"),
+        (replaced(POINTS["entry-points"], "points = -8", "entry-points"), ("entry-points", "points = -8"), "-8 points"),
+        (replaced(POINTS["entry-points"] + "\n", "", "entry-points"), ('id = "entry-points"',), "missing required field `points`"),
         (replaced('item = "exercise"', 'item = "exercises"', "package-builds"), ('item = "exercises"',), "no checklist item"),
         (lambda text: text + '\n[[checklist]]\nitem = "essay"\ntext = "x"\n', ('item = "essay"',), "no check gives points"),
     ],

@@ -23,11 +23,7 @@ FILES = {
     "launch": "launch/numeric_chatter.py",
     "setup": "setup.py",
 }
-CHECKS = (
-    *("package-builds", "entry-points", "talker-type", "talker-start", "talker-step", "talker-wrap", "talker-chatter"),
-    *("listener-numeric", "listener-chatter", "launch-starts", "launch-only-numeric", "launch-conversation"),
-    *("originals-kept", "git-pushed", "git-clean"),
-)
+CHECKS = tuple(check.id for check in lab.rubric().check)
 GIT_CHECKS = ("git-pushed", "git-clean")
 
 

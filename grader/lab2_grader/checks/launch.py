@@ -27,6 +27,7 @@ COMMON_ERRORS = {
 }
 NEARBY, NEARBY_PER_MESSAGE = 100, 2  # lines that can belong to a message: so many, and so many for each before it
 NOT_WHAT_IT_RECEIVES = ("silent", "constant", "others", "noise", "no-f-string")  # a listener whose lines answer nothing
+QUEUE_FULL = 8  # numbers that wait for a listener whose queue holds ten, as in the worksheet: others may be lost by now
 ENOUGH_ANSWERS = 8  # of the slow dozen; the first few may be lost while the pair still discovers each other
 
 
@@ -139,6 +140,8 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
         return failed(check, "nothing")
     if scene.flooded:
         return failed(check, "flood")
+    if answered and _fell_behind(scene, topic, printed):
+        return inconclusive(check, "inconclusive-behind")
     shown = ", ".join(str(message.data) for message in spoken[:5]) + (" …" if len(spoken) > 5 else "")
     return failed(check, "silent", shown=shown, printed=len(answered), count=len(spoken))
 
@@ -155,8 +158,21 @@ def _spoken(view: View, scene: SceneView) -> list[Message]:
     return ([message for message in numbers if slow <= message.at < fast] or numbers)[:ticks]
 
 
-def _printed(view: View, scene: SceneView, spoken: list[Message]) -> frozenset[int]:
-    """The numbers that the listener printed while the *spoken* ones came, other than as part of a greeting.
+def _fell_behind(scene: SceneView, topic: str, printed: Mapping[int, float]) -> bool:
+    """Whether the listener was so late with a number that its queue may have lost others; never when the clock waits for it."""
+    if "real-time" not in scene.phases:
+        return False
+    numbers = [message for message in scene.messages if message.topic == topic]
+    waiting = (
+        sum(other.at <= printed[message.data] for other in numbers[index + 1 :])
+        for index, message in enumerate(numbers)
+        if isinstance(message.data, int) and message.data in printed
+    )
+    return any(count >= QUEUE_FULL for count in waiting)
+
+
+def _printed(view: View, scene: SceneView, spoken: list[Message]) -> dict[int, float]:
+    """The numbers that the listener printed while the *spoken* ones came, other than as part of a greeting, and when first.
 
     Lines and messages reach the grader on different ways and in no sure order, so lines are counted, not timed.
     """
@@ -171,11 +187,11 @@ def _printed(view: View, scene: SceneView, spoken: list[Message]) -> frozenset[i
     sources = {listener} if listener in sources else sources - {"launch", talker}
     enough = NEARBY + NEARBY_PER_MESSAGE * (scene.messages.index(spoken[-1]) + 1 if spoken else 0)
     texts = {str(other.data) for other in scene.messages[:enough] if other.topic == topic}
-    lines = [said(line.text) for line in scene.lines if line.source in sources][:enough]
-    found: set[int] = set()
-    for line in lines:
-        found |= numbers_in(line, [text for text in texts if text and text in line])
-    return frozenset(found)
+    lines = [(line.at, said(line.text)) for line in scene.lines if line.source in sources][:enough]
+    found: dict[int, float] = {}
+    for at, line in reversed(lines):
+        found |= dict.fromkeys(numbers_in(line, [text for text in texts if text and text in line]), at)
+    return found
 
 
 def _is_conversation(spoken: list[Message], answered: list[Message]) -> bool:

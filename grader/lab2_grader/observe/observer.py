@@ -50,6 +50,7 @@ GRAPH_POLL_SECONDS = 0.02
 PROCESS_POLL_SECONDS = 0.1
 IDLE_SECONDS = 0.5  # a program that is busy for longer is left alone
 QUICK_PROCESS_POLL_SECONDS = 0.04  # until the first message: what dies at once must have been seen
+BLIND_SECONDS = 1.0  # between two looks at the processes: what was done meanwhile is not known
 UNNAMED = "_NODE_NAME_UNKNOWN_"  # the node of an endpoint whose participant has not said its names yet
 UNNAMED_SECONDS = 1.0  # it is waited for so long
 PROCESS_ID = slice(4, 6)  # of an identity of Fast DDS (GUID prefix): the low half of the process's own pid
@@ -75,6 +76,7 @@ class Observer:
         self.lines: list[Line] = []
         self.endpoints: dict[str, Endpoint] = {}
         self._changed_at = 0.0
+        self._looked_at = 0.0
         self._unnamed: dict[str, float] = {}  # since when an endpoint has been there without the name of its node
         self._nodes: frozenset[str] = frozenset()
         self.ended: ProgramEnded | None = None
@@ -112,6 +114,7 @@ class Observer:
         self._label = label
         self.recorder.begin()
         self._program = process.Process(request, on_output=self._on_output)
+        self._changed_at = self._looked_at = self.recorder.now()  # on a busy machine that took a while
 
     def _on_output(self, stream: str, data: bytes) -> None:
         self._output.put((stream, data))
@@ -165,8 +168,12 @@ class Observer:
             return
         found = {info.pid: info for info in process.tree(self._program.pid)} if self._program.running else {}
         self._table = found
+        now = self.recorder.now()
         if process.busy(found):
-            self._changed_at = self.recorder.now()
+            self._changed_at = now
+        elif (blind := now - self._looked_at) > BLIND_SECONDS:  # nobody knows what was done meanwhile
+            self._changed_at = min(now, self._changed_at + blind)
+        self._looked_at = now
         marker = f"/lib/{lab.specification().package}/"
         for pid, info in found.items():
             if not self._processes.get(pid):  # one that was seen before its exec has the name of its parent yet
@@ -251,9 +258,10 @@ class Observer:
     def quiet_seconds(self) -> float:
         """For how long nothing has happened: the graph did not change, and no process of the program had work to do.
 
-        Unlike a time on the wall clock, this is not used up while the machine keeps the program waiting.
+        Unlike a time on the wall clock, this is not used up while the machine keeps the program waiting, nor while the
+        observer itself did not get to look.
         """
-        return self.recorder.now() - self._changed_at
+        return max(0.0, self._looked_at - self._changed_at)
 
     def look_at_graph(self) -> None:
         """Record which endpoints came and went, and subscribe to what is published as it is offered."""
