@@ -90,6 +90,7 @@ class Animal(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         edits: What is changed in a copy of `solution/`, in order.
         fails: Check → key of the fault in the catalogue, and a fragment of the hint.
         blocked: Check → the check because of which.
+        blocks_all: The check because of which all others are blocked, for what does not build.
         within: Folder of the submission in which the package lies; `.` for its top.
         beside: Further files of the submission, outside the package.
         slow: Takes more than a few seconds of real time: left to `make test-slow`.
@@ -102,6 +103,7 @@ class Animal(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     edits: tuple[Edit, ...] = ()
     fails: dict[str, tuple[str, str]] = {}
     blocked: dict[str, str] = {}
+    blocks_all: str = ""
     within: str = "."
     beside: dict[str, str] = {}
     slow: bool = False
@@ -115,9 +117,9 @@ class Animal(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def statuses(self) -> dict[str, str]:
         """The expected status of each check; for a folder, git is not assessed."""
-        expected = {check: "not-assessed" if check in GIT_CHECKS else "pass" for check in CHECKS}
-        expected |= dict.fromkeys(self.fails, "fail")
-        return expected | dict.fromkeys(self.blocked, "blocked")
+        usual = "blocked" if self.blocks_all else "pass"
+        expected = {check: "not-assessed" if check in GIT_CHECKS else usual for check in CHECKS}
+        return expected | dict.fromkeys(self.blocked, "blocked") | dict.fromkeys(self.fails, "fail")
 
     def build(self, folder: Path) -> Path:
         """Make the submission in the empty *folder*, and return it."""

@@ -71,7 +71,7 @@ def complaints(animal: Animal | Repository, checks: Iterable[CheckResult | Verdi
         elif (
             check.status is Status.BLOCKED
             and isinstance(animal, Animal)
-            and not set(animal.blocked[name].split(" or ")).intersection(check.because)
+            and not set((animal.blocked.get(name) or animal.blocks_all).split(" or ")).intersection(check.because)
         ):
-            found.append(f"{seen} instead of because of {animal.blocked[name]}")
+            found.append(f"{seen} instead of because of {animal.blocked.get(name) or animal.blocks_all}")
     return found
