@@ -69,7 +69,7 @@ def test_whatever_comes_only_harmless_characters_are_left() -> None:
 
 @pytest.mark.parametrize("piece", ["\x1b[", "\x1b]0;", "\x1b[0;", "\x1b ", "\u202e", "0;"])
 def test_time_grows_with_the_length_only(piece: str) -> None:
-    began = time.monotonic()
+    began = time.process_time()
     clean(piece * (2_000_000 // len(piece)), 100)
     clean("\x1b[" + piece * (2_000_000 // len(piece)), 100, lines=True)
-    assert time.monotonic() - began < 5
+    assert time.process_time() - began < 5
