@@ -116,6 +116,8 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
         return blocked(check, *starts.because)
     if scene is None or starts.status is not Status.PASS:
         return blocked(check, "launch-starts")
+    if earlier["talker-type"].message == "wrong-data":
+        return blocked(check, "talker-type")  # whatever number went out, nobody meant it
     spoken = _spoken(view, scene)
     printed = _printed(view, scene, spoken)
     answered = [message for message in spoken if message.data in printed]

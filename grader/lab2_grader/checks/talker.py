@@ -137,11 +137,12 @@ def talker_wrap(view: View, earlier: Earlier) -> Verdict:
         return blocked(check, "talker-step")
     if sequel.stays:
         return failed(check, "stuck", shown=around(sequel.values, sequel.stays[0].index))
-    if wrong := next((step for step in sequel.returns if not _returns_well(step, rise, view)), None):
+    wrong = next((step for step in sequel.returns if not _returns_well(step, rise, view)), None)
+    outside = next((i for i, v in enumerate(sequel.values) if not topic.smallest <= v <= topic.largest), None)
+    if wrong and (outside is None or outside >= wrong.index):
         # In steps of two a count can jump over the number at which it would be set back.
         skipped = rise > 1 and wrong.after != topic.smallest
         return blocked(check, "talker-step") if skipped else _bad_return(wrong, sequel, view)
-    outside = next((i for i, v in enumerate(sequel.values) if not topic.smallest <= v <= topic.largest), None)
     if outside is not None:
         key = "too-large" if sequel.values[outside] > topic.largest else "negative"
         return failed(check, key, shown=around(sequel.values, outside))
