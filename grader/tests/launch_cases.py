@@ -416,7 +416,8 @@ def generate_launch_description():
         " RegisterEventHandler(OnProcessExit(on_exit=lambda event, context: LogInfo("
         "msg=f'{event.process_name} {event.returncode}'))),"
         " RegisterEventHandler(OnProcessIO(target_action=t, on_stdout=lambda event: LogInfo("
-        "msg='io ' + event.text.decode().split()[0]))),"
+        # Its second write comes with the first or after it: only what the first begins with is sure.
+        "msg='io ' + event.text.decode().split()[0]) if event.text.startswith(b'args') else None)),"
         " RegisterEventHandler(OnShutdown(on_shutdown=[LogInfo(msg=['over: ', LocalSubstitution('event.reason')])]))",
         (
             "[INFO] [launch.user]: begun",
