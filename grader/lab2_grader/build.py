@@ -20,6 +20,7 @@ from lab2_grader import lab, process, sandbox
 from lab2_grader.errors import FaultError
 from lab2_grader.records import Build, EndedBy, EntryPoint, Outcome, Request, Submission
 from lab2_grader.ros import Ros
+from lab2_grader.tar import take_out
 from lab2_grader.text import clean
 
 LOG_BYTES = 20_000  # the end of what the build printed is kept
@@ -85,7 +86,11 @@ def _colcon(
     workspace, source = (sandbox.WORKSPACE, PACKAGE_INSIDE) if isolation.on else (str(into), package_dir)
     environment = ros.environment(sandbox.HOME if isolation.on else str(into))
     if shutil.which("colcon", path=dict(environment)["PATH"]) is None:
-        raise FaultError("colcon is not installed where the grader looks for it. Run `make setup`.", "build")
+        raise FaultError(
+            "colcon is not installed where the grader looks for it. Run `make setup`, or "
+            "`pip install colcon-common-extensions 'setuptools<80'` beside the grader.",
+            "build",
+        )
     request = Request(
         argv=("sh", "-c", SCRIPT, "build", workspace, source, package),
         env=environment,
@@ -155,7 +160,7 @@ def _unpack(archive: bytes | bytearray, into: Path) -> str:
                 if total > limits.build.install_bytes or member.issparse():
                     return "install"
                 if PurePosixPath(member.name).parts[:1] == ("install",):
-                    members.extract(member, into, filter="data")
+                    take_out(members, member, into)
     except (tarfile.TarError, OSError, ValueError):
         return "install"
     return ""

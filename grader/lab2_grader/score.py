@@ -50,7 +50,9 @@ def score(evidence: Evidence, verdicts: Sequence[Verdict], rubric: Rubric, evide
     )
     inconclusive = [check for check in checks if check.status is Status.INCONCLUSIVE]
     graded = not inconclusive
-    reasons = tuple(dict.fromkeys(f"{check.id} {check.observed}" for check in inconclusive))
+    # One cause withholds many checks: it is said once, with the first of them.
+    first = {check.observed: check.id for check in reversed(inconclusive)}
+    reasons = tuple(f"{first[why]} {why}" for why in reversed(first))
     withheld = (messages.status("withheld", why="; ".join(reasons[:3])),) if reasons else ()
     facts = evidence.submission
     return Result(

@@ -21,7 +21,7 @@ LAUNCHER = PACKAGE / "ros" / "launcher"  # a program of its own, run inside the 
 
 # From the top down: a module imports only from those above it, or from its own group.
 LAYERS = (
-    ("records", "errors", "text", "reading", "near"),
+    ("records", "errors", "text", "tar", "reading", "near"),
     ("lab", "sections"),
     ("messages", "stand_in"),
     ("process", "cgroup"),

@@ -29,6 +29,7 @@ from lab2_grader.records import (
     Unsupported,
     Verdict,
 )
+from lab2_grader.tar import take_out
 
 
 def recorded(name: str, folder: Path) -> Evidence:
@@ -36,7 +37,8 @@ def recorded(name: str, folder: Path) -> Evidence:
     target = folder / name
     if not target.exists():
         with tarfile.open(DATA / f"{name}.tar.xz") as archive:
-            archive.extractall(target, filter="data")
+            for member in archive:
+                take_out(archive, member, target)
     return evidence.read(target)
 
 

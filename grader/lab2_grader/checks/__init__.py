@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from lab2_grader import messages
 from lab2_grader.checks import launch, listener, originals, package, repository, talker
 from lab2_grader.checks.verdicts import blocked, inconclusive
 from lab2_grader.checks.view import View
@@ -45,10 +46,9 @@ def judge(evidence: Evidence) -> tuple[Verdict, ...]:
 def _judge_one(name: str, check: Check, view: View, earlier: Mapping[str, Verdict]) -> Verdict:
     if name not in NEEDS_NO_BUILD:
         base = earlier["package-builds"]
-        if base.status is Status.INCONCLUSIVE:
-            return inconclusive(name, "inconclusive-scene", fault=base.observed)
+        if view.evidence.faults or base.status is Status.INCONCLUSIVE:
+            fault = (*view.evidence.faults, messages.phrase("no-build"))[0]
+            return inconclusive(name, "inconclusive-scene", fault=fault)
         if base.status is not Status.PASS:
             return blocked(name, "package-builds")
-        if view.evidence.faults:
-            return inconclusive(name, "inconclusive-scene", fault=view.evidence.faults[0])
     return check(view, earlier)
