@@ -27,7 +27,7 @@ WORKSPACE = "/ws"
 # The first thing that happens inside: without it a failure was that of the walls, never of what stands within.
 ANNOUNCEMENT = "[lab2-grader] inside"
 ANNOUNCE = """
-command -v "$1" >/dev/null || { echo "$1 is not found inside it" >&2; exit 127; }
+[ -e "$1" ] || command -v "$1" >/dev/null || { echo "$1 is not found inside it" >&2; exit 127; }
 shift
 printf "%s\\n" "$0" >&2
 exec "$@"
@@ -120,7 +120,7 @@ def confine(
         isolation: Whether walls can be had.
         network: Whether it shares the network of whoever starts it (the observer's private one).
         workspace_bytes: Size of a writable `WORKSPACE` of its own; 0 for none.
-        needs: The grader's own program that must be found inside; that it is not is a fault of the machine.
+        needs: The program or file of ours that must be found inside; that it is not is a fault of the machine.
     """
     if not isolation.on:
         return request
@@ -145,10 +145,17 @@ def confine(
             argv += ["--ro-bind", name, name]
     for name in SYSTEM_FILES:
         argv += ["--ro-bind-try", name, name]
-    for mount in (*interpreter_mounts(), *mounts):
+    hidden = own_files()
+    # What is shown of a hidden folder all the same: the launcher, of a grader that pip installed.
+    shown = [mount for mount in mounts if any(Path(mount.host).is_relative_to(path) for path in hidden)]
+    for mount in (*interpreter_mounts(), *(mount for mount in mounts if mount not in shown)):
         argv += ["--ro-bind", mount.host, mount.inside or mount.host]
-    for hidden in own_files():
-        argv += ["--tmpfs", hidden, "--remount-ro", hidden]
+    for path in hidden:
+        argv += ["--tmpfs", path]
+    for mount in shown:
+        argv += ["--ro-bind", mount.host, mount.inside or mount.host]
+    for path in hidden:
+        argv += ["--remount-ro", path]
     argv += ["--remount-ro", "/", "--chdir", request.cwd, "--"]
     argv += ["sh", "-c", ANNOUNCE, ANNOUNCEMENT, needs, *_few_processes(request.limits), *request.argv]
     return msgspec.structs.replace(request, argv=tuple(argv), cwd="/", announces=ANNOUNCEMENT)

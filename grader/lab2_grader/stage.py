@@ -305,7 +305,7 @@ class Stage:
             sandbox.Mount(str(installed / "install"), INSTALLED),
             *(sandbox.Mount(path) for path in self._ros.reads()),
         )
-        return sandbox.confine(request, mounts, self._isolation)
+        return sandbox.confine(request, mounts, self._isolation, needs=self._ros.launcher)
 
 
 def entry(scene: Scene) -> SceneEntry:

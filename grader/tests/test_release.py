@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import json
 import os
 import runpy
 import subprocess
@@ -106,9 +107,9 @@ def test_the_wheel_works_where_nothing_of_the_checkout_is(
     subprocess.run([sys.executable, "-m", "venv", str(tmp_path / "venv")], check=True)
     wheel = next(students.glob("*.whl"))
     python = tmp_path / "venv/bin/python"
-    install = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", str(wheel)]
+    install = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", f"{wheel}[wheels,colcon]"]
     subprocess.run(install, check=True, cwd=tmp_path)
-    clean = {name: value for name, value in os.environ.items() if name in ("PATH", "HOME", "LANG")}
+    clean = {name: value for name, value in os.environ.items() if name in ("HOME", "LANG")} | {"PATH": os.defpath}
 
     def grader(*arguments: str) -> subprocess.CompletedProcess[str]:
         command = [str(tmp_path / "venv/bin/lab2-grader"), *arguments]
@@ -121,6 +122,10 @@ def test_the_wheel_works_where_nothing_of_the_checkout_is(
     done = grader("rescore", str(evidence))
     assert done.returncode == 0, done.stderr
     assert (evidence / "report.html").exists()
+    done = grader("grade", str(ROOT / "solution"), "--out", str(tmp_path / "graded"))
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "graded" / "result.json").read_text())
+    assert result["score"] == result["max_score"], result["notes"]
 
 
 def test_solutions_come_out_on_their_date_and_not_before(tmp_path: Path) -> None:

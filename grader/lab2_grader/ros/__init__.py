@@ -83,6 +83,11 @@ class Ros(Record, frozen=True):
         outside = [p for p in self.prefixes if not Path(p).is_relative_to("/usr") and Path(p) != Path(sys.prefix)]
         return (*outside, str(LAUNCHER), str(TIME_LAPSE_LAUNCH), str(DISCOVERY_PROFILE))
 
+    @property
+    def launcher(self) -> str:
+        """The program or file that launches; without it no launch file can be right."""
+        return "ros2" if self.has_ros2_launch else str(LAUNCHER / "run.py")
+
     def launch_argv(self, package: str, launch_file: str, path: str, time_lapse: bool) -> tuple[str, ...]:
         """The command that launches *launch_file* of *package*.
 
@@ -94,7 +99,7 @@ class Ros(Record, frozen=True):
         """
         if not self.has_ros2_launch:
             follow = ("--use-sim-time",) if time_lapse else ()
-            return (process.PYTHON, str(LAUNCHER / "run.py"), *follow, package, launch_file)
+            return (process.PYTHON, self.launcher, *follow, package, launch_file)
         if time_lapse:
             return ("ros2", "launch", str(TIME_LAPSE_LAUNCH), f"launch_file:={path}")
         return ("ros2", "launch", package, launch_file)
