@@ -37,6 +37,10 @@ LAST_OUTPUT_SECONDS = 0.5  # how long output of an ended process is waited for
 PAGE_BYTES = resource.getpagesize()
 PR_SET_CHILD_SUBREAPER = 36
 
+# Ignored by what runs in the background of a script (POSIX 2.11) or under nohup, and inherited by what that starts: a
+# node would then not hear that it is to end.
+ASKS_TO_END = (signal.SIGINT, signal.SIGQUIT, signal.SIGHUP)
+
 # The Python that runs the grader, under the name by which the sandbox knows it too: without `..`, links not followed.
 PYTHON = os.path.abspath(sys.executable)  # noqa: PTH100 resolve() follows links, out of the virtual environment
 
@@ -296,6 +300,9 @@ class Process:
         self._group = self._make_group() if self._base else None
         if self._group is not None:
             argv = self._group.wrap(argv)
+        ignored = [number for number in ASKS_TO_END if signal.getsignal(number) is signal.SIG_IGN]
+        if ignored:
+            argv = ("env", *(f"--default-signal={number.name.removeprefix('SIG')}" for number in ignored), *argv)
         try:
             self._popen = subprocess.Popen(
                 argv,

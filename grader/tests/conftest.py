@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import signal
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,9 @@ from lab2_grader import lab, pipeline, ros, sandbox
 from lab2_grader.records import Result
 
 ROOT = Path(__file__).resolve().parents[2]
+
+# Tests that interrupt a grader do so also where they run in the background of a script, which ignores SIGINT.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # What the samples change in the solution: (file, what stands there, what takes its place).
 SAMPLES = {

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -31,9 +33,14 @@ def edit(path: Path, *changes: tuple[str, str]) -> None:
 
 
 def build(copy: Path) -> subprocess.CompletedProcess[str]:
+    return run(copy, "lab2_worksheet", "build")
+
+
+def run(copy: Path, *command: str) -> subprocess.CompletedProcess[str]:
+    """Run a module of the copy, and nothing of the repository itself."""
     path = os.pathsep.join([str(copy / "grader"), str(copy / "worksheet")])
     return subprocess.run(
-        [sys.executable, "-m", "lab2_worksheet", "build"],
+        [sys.executable, "-m", *command],
         cwd=copy,
         env={**os.environ, "PYTHONPATH": path},
         capture_output=True,
@@ -82,6 +89,41 @@ def test_the_packages_follow_the_period(copy: Path) -> None:
     assert done.returncode == 0, done.stderr
     for package in ("lab2_template", "solution"):
         assert "period_in_seconds = 2.0\n" in (copy / package / "lab2/talker.py").read_text()
+
+
+def test_the_grader_follows_the_facts(copy: Path) -> None:
+    facts = copy / "grader" / "lab2_grader" / "facts"
+    edit(
+        facts / "course.toml",
+        (r"^title = .*", 'title = "Lab 2: Talk and Listen"'),
+        (r"^module_code = .*", 'module_code = "ROBO1234"'),
+        (r"^contact_name = .*", 'contact_name = "Ada Lovelace"'),
+        (r"^worksheet_url = .*", 'worksheet_url = "https://example.org/lab2.html"'),
+    )
+    edit(facts / "specification.toml", (r"^largest = .*", "largest = 99"), (r"^period_seconds = .*", "period_seconds = 1"))
+    edit(facts / "rubric.toml", (r'(id = "talker-wrap"(?:\n.+)*\npoints = )\d+', r"\g<1>77"))
+    assert build(copy).returncode == 0
+
+    now = grade(copy, copy / "solution")
+    assert now["score"] == now["max_score"] > 77, now["checks"]
+    assert all("127" not in check["expected"] for check in now["checks"])
+
+    then = grade(copy, REPOSITORY / "solution")
+    lost = {check["id"]: check for check in then["checks"] if check["status"] == "fail"}
+    assert list(lost) == ["talker-wrap"]
+    assert then["score"] == then["max_score"] - 77
+    assert "99" in lost["talker-wrap"]["expected"]
+    for report in ("report.html", "report.md"):
+        text = (copy / "results" / "solution" / report).read_text(encoding="utf-8")
+        assert "Talk and Listen" in text and "https://example.org/lab2.html#section-6-7" in text
+    assert "ROBO1234" in (copy / "results" / "solution" / "report.html").read_text(encoding="utf-8")
+
+
+def grade(copy: Path, submission: Path) -> dict[str, Any]:
+    done = run(copy, "lab2_grader", "grade", str(submission), "--out", str(copy / "results" / "solution"))
+    assert done.returncode == 0, done.stderr
+    result: dict[str, Any] = json.loads((copy / "results" / "solution" / "result.json").read_text(encoding="utf-8"))
+    return result
 
 
 @pytest.mark.parametrize(
