@@ -100,7 +100,11 @@ def test_the_grader_follows_the_facts(copy: Path) -> None:
         (r"^contact_name = .*", 'contact_name = "Ada Lovelace"'),
         (r"^worksheet_url = .*", 'worksheet_url = "https://example.org/lab2.html"'),
     )
-    edit(facts / "specification.toml", (r"^largest = .*", "largest = 99"), (r"^period_seconds = .*", "period_seconds = 1"))
+    edit(
+        facts / "specification.toml",
+        (r"^largest = .*", "largest = 99"),
+        (r"^period_seconds = .*", "period_seconds = 1"),
+    )
     edit(facts / "rubric.toml", (r'(id = "talker-wrap"(?:\n.+)*\npoints = )\d+', r"\g<1>77"))
     assert build(copy).returncode == 0
 
