@@ -122,7 +122,7 @@ lint: setup-dev ## check style, types, spelling, links and the lab's facts; chan
 	@$(WITH) $(BIN)/python -m lab2_worksheet lint
 
 format: setup-dev ## put the code into its form
-	@$(BIN)/ruff check --fix grader worksheet
+	@$(BIN)/ruff check --fix --exit-zero --quiet grader worksheet
 	@$(BIN)/ruff format grader worksheet
 
 bench: setup-dev ## measure how fast a grade is; writes build/bench.json
