@@ -278,6 +278,7 @@ def _fill(arguments: argparse.Namespace) -> int:
     )
     for heading, names in (
         ("Without a mark, so left as they were", filled.without_mark),
+        ("More than one result or row for the same student, so left as they were", filled.ambiguous),
         ("In the gradebook, but nothing was handed in", filled.only_in_book),
         ("Graded, but not in the gradebook", filled.only_in_results),
     ):

@@ -114,12 +114,8 @@ def write_atomically(path: Path, data: bytes) -> None:
 def cannot_write(path: Path, error: OSError) -> Lab2Error:
     """Whose fault it is that *path* could not be written: the caller's who chose the folder, or the machine's."""
     if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR, errno.EEXIST):
-        return UsageError(
-            f"{path} cannot be written ({error.strerror}). Choose another folder for the result with --out."
-        )
-    return FaultError(
-        f"{path} could not be written ({error.strerror}). Make room for it and grade the submission again."
-    )
+        return UsageError(f"{path} cannot be written ({error.strerror}). Choose another place for it with --out.")
+    return FaultError(f"{path} could not be written ({error.strerror}). Make room for it and try again.")
 
 
 def pretty(record: Record) -> bytes:

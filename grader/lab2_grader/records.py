@@ -751,6 +751,7 @@ class ClassLine(Record, frozen=True):
         max_score: Points that could be had; 0 when nothing was judged.
         reason: Why there is no mark; empty when there is one.
         lost: Checks that did not pass, in the rubric's order.
+        not_assessed: Checks that could not be asked of what was handed in, and cost nothing, in the rubric's order.
         flags: What a person should look at.
         note: What a person should know of how it was handed in.
         shown: Where it came from.
@@ -769,6 +770,7 @@ class ClassLine(Record, frozen=True):
     max_score: int = 0
     reason: str = ""
     lost: tuple[Lost, ...] = ()
+    not_assessed: tuple[str, ...] = ()
     flags: tuple[str, ...] = ()
     note: str = ""
     shown: str = ""

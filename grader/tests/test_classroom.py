@@ -21,11 +21,11 @@ from class_generator import make
 from conftest import ROOT
 from zoo_builder import Animal, animals
 
-from lab2_grader import lab, pipeline
+from lab2_grader import lab, pipeline, report
 from lab2_grader.classroom import pool, remark, results, run, summary
 from lab2_grader.classroom.records import Stamp
 from lab2_grader.errors import FaultError, UsageError
-from lab2_grader.records import ClassLine, ClassState, ClassSummary, Lost, Unknown
+from lab2_grader.records import ClassLine, ClassState, ClassSummary, Clock, Lost, SubmissionFacts, Unknown
 from lab2_grader.report import class_page
 
 TWO_FAULTS = "step-two"
@@ -124,6 +124,10 @@ def test_what_a_class_leaves(small_results: Path) -> None:
     assert [item.what for item in summed.unknown] == ["notes.md"]
     rates = {check.id: check for check in summed.checks}
     assert (rates["talker-wrap"].passed, rates["talker-wrap"].judged) == (2, 3)
+    with (small_results / summary.CSV).open(encoding="utf-8-sig", newline="") as file:
+        rows = {row["name"]: row for row in csv.DictReader(file)}
+    assert (rows["ada"]["talker-wrap"], rows["cem"]["talker-wrap"]) == ("pass", "blocked")
+    assert (rows["ada"]["git-pushed"], rows["dev"]["git-pushed"]) == ("not-assessed", "")
     assert sum(fault.count for fault in rates["talker-wrap"].faults) == 1
     assert not (small_results / "dev").exists()
     assert list((small_results / results.INCOMING).glob("*")) == []
@@ -147,6 +151,24 @@ def test_the_second_call_grades_only_what_is_new_or_has_changed(copied: tuple[Pa
     assert sorted(watched.graded) == ["ben", "cem", "dev", "fay"] and watched.known == []
     assert [line.name for line in summed.lines] == ["ben", "cem", "dev", "fay"]
     assert marks(out)["ben"] == before["ben"] and marks(out)["cem"] == before["cem"]
+
+
+@pytest.mark.parametrize("damage", [b"", b"{", b'{"key": "\xff"}', b'{"schema": 1}'])
+def test_what_is_damaged_counts_as_not_there(tmp_path: Path, damage: bytes) -> None:
+    for name in (results.STAMP, report.RESULT):
+        (tmp_path / name).write_bytes(damage)
+    assert results.stamp(tmp_path) is None and results.result(tmp_path) is None
+
+
+def test_a_result_is_up_to_date_only_for_the_way_in_which_it_was_run() -> None:
+    facts = SubmissionFacts("ada", "here", "0" * 64, None, "", None, ())
+    keys = {
+        results.key_of(facts, clock, ros, isolation=isolation)
+        for clock in Clock
+        for ros in ("auto", "wheels")
+        for isolation in (True, False)
+    }
+    assert len(keys) == 8
 
 
 def test_another_rubric_costs_no_run(copied: tuple[Path, Path], tmp_path: Path) -> None:
@@ -288,7 +310,12 @@ def test_killed_and_called_again(small: Path, small_results: Path, tmp_path: Pat
 def test_interrupted_says_how_far_it_came_and_leaves_nothing_running(small: Path, tmp_path: Path) -> None:
     out = tmp_path / "results"
     process = start(small, out)
-    wait_until(lambda: any("colcon build" in command for command in left_running(process.pid)), 60)
+
+    def builds() -> bool:
+        assert process.poll() is None, process.communicate()
+        return any("colcon build" in command for command in left_running(process.pid))
+
+    wait_until(builds, 60)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 130 and "Interrupted" in errors

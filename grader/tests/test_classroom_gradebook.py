@@ -126,6 +126,30 @@ def test_moodle(tmp_path: Path, results: Path) -> None:
     assert b"50 of 100. Lost: talker-wrap" in with_words and b"old, kept" not in with_words
 
 
+def test_a_namesake_gets_nobody_elses_mark(tmp_path: Path) -> None:
+    lines = (line("john-40", 90, "Participant 40", "John Smith"),)
+    summary.write(tmp_path / "results", summary.summarise(lines, (), lab.rubric(), ()))
+    head = b'Identifier,"Full name",Grade,"Maximum Grade"\n'
+    twelve, forty = b'"Participant 12","John Smith",,100\n', b'"Participant 40","John Smith",,100\n'
+    after, done = filled(tmp_path, tmp_path / "results", head + twelve + forty)
+    assert after == head + twelve + forty.replace(b",,", b",90,")
+    assert done.only_in_book == ("Participant 12",)
+    # By their names alone nobody can tell them apart.
+    _, done = filled(
+        tmp_path, tmp_path / "results", b'"Full name",Grade,"Maximum Grade"\nJohn Smith,,9\nJohn Smith,,9\n'
+    )
+    assert (done.cells, done.ambiguous) == (0, ("John Smith", "John Smith"))
+
+
+def test_two_results_for_one_student_are_left_to_a_person(tmp_path: Path) -> None:
+    lines = (line("alice", 20, "alice"), line("alice-2", 90, "alice"), line("bob", 50))
+    summary.write(tmp_path / "results", summary.summarise(lines, (), lab.rubric(), ()))
+    raw = b"Username,Lab [Total Pts: 100 Score] |1\nalice,\nbob,\n"
+    after, done = filled(tmp_path, tmp_path / "results", raw)
+    assert after == raw.replace(b"bob,", b"bob,50")
+    assert done.ambiguous == ("alice",) and not done.only_in_results
+
+
 @pytest.mark.parametrize(
     ("raw", "message"),
     [

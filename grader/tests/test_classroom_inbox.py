@@ -10,8 +10,8 @@ import pytest
 from class_generator import make
 from intake_helpers import write, write_package
 
-from lab2_grader import submission
-from lab2_grader.classroom import inbox, minerva, roster
+from lab2_grader import cli, submission
+from lab2_grader.classroom import inbox, minerva, roster, run, summary
 from lab2_grader.classroom.records import Inbox
 from lab2_grader.errors import RefusedError, UsageError
 
@@ -70,6 +70,34 @@ def test_names_are_told_apart_whatever_their_case(tmp_path: Path) -> None:
     found = looked(box)
     assert len({name.lower() for name in names(found)}) == 4 and "index.html" not in names(found)
     assert sum("more than one" in entry.note for entry in found.entries) == 3
+
+
+def test_a_students_archive_speaks_for_nobody_else(tmp_path: Path) -> None:
+    box = tmp_path / "inbox"
+    write_package(box / "ben")
+    forged = {"L_alice_attempt_2026-10-20-17-30-05_lab2.zip": package_zip(tmp_path / "p")}
+    zip_of(box / "mallory.zip", forged)
+    assert {entry.keys for entry in looked(box).entries} == {("ben",), ("mallory",)}
+    # Downloads and nothing else are what an assistant has put there.
+    both = tmp_path / "downloads"
+    zip_of(both / "group-1.zip", forged)
+    zip_of(both / "group-2.zip", {"L_bob_attempt_2026-10-20-17-30-05_lab2.zip": package_zip(tmp_path / "p2")})
+    assert names(looked(both)) == ["alice", "bob"]
+    (both / "carol.tar.gz").write_bytes(b"whatever")
+    assert names(looked(both)) == ["carol", "group-1", "group-2"]
+
+
+def test_no_submission_takes_the_name_of_a_file_of_the_results(tmp_path: Path) -> None:
+    assert {summary.PAGE, summary.CSV, summary.JSON, run.FAULTS} == inbox.RESERVED
+    for name in inbox.RESERVED:
+        write_package(tmp_path / "in" / name)
+    assert not inbox.RESERVED.intersection(names(looked(tmp_path / "in")))
+
+
+def test_what_is_no_table_is_listed(tmp_path: Path) -> None:
+    write_package(tmp_path / "in/ada")
+    write(tmp_path / "in", {"long.txt": "x" * 200_000, "long.csv": "repository,x\n" + "y" * 200_000})
+    assert {item.what for item in looked(tmp_path / "in").unknown} == {"long.txt", "long.csv"}
 
 
 def test_the_results_in_the_inbox_are_no_submission(tmp_path: Path) -> None:
@@ -205,6 +233,28 @@ def test_a_download_from_moodle(tmp_path: Path) -> None:
     assert submission.take(inbox.fetch(found.entries[2], tmp_path / "s"), tmp_path / "out")
 
 
+@pytest.mark.parametrize("piece", [".\u200b.", "..\u00ad", ".\x1b[m.", "\u202e..", ".. "])
+def test_no_name_leads_out_of_the_scratch_folder(tmp_path: Path, piece: str) -> None:
+    inside = f"X_12_assignsubmission_file_/{piece}/{piece}/escaped/evil.txt"
+    box = zip_of(tmp_path / "box/moodle.zip", {inside: "gone"})
+    (entry,) = looked(box).entries
+    scratch = tmp_path / "scratch" / "deep"
+    scratch.mkdir(parents=True)
+    try:
+        inbox.fetch(entry, scratch)
+    except RefusedError as error:
+        assert error.rule == "name-control"
+    assert not [path for path in tmp_path.rglob("evil.txt") if scratch / "handed-in" not in path.parents]
+
+
+def test_a_name_too_long_for_the_disk_is_refused(tmp_path: Path) -> None:
+    box = zip_of(tmp_path / "moodle.zip", {f"X_12_assignsubmission_file_/{'語' * 200}.py": "x"})
+    (entry,) = looked(box).entries
+    with pytest.raises(RefusedError) as caught:
+        inbox.fetch(entry, tmp_path)
+    assert caught.value.rule == "name-too-long"
+
+
 # --- tables ---------------------------------------------------------------------------------------
 
 
@@ -248,3 +298,8 @@ def test_generated_classes_are_understood(tmp_path: Path, kind: str) -> None:
     box, expected = make(tmp_path / "class", 12, 3, kind)
     found = looked(box)
     assert sorted(names(found)) == sorted(expected) and not found.unknown
+
+
+def test_no_inbox_is_not_the_folder_one_stands_in(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["grade-all", ""]) == 2
+    assert "No inbox was named" in capsys.readouterr().err

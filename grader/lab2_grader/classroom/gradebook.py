@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import codecs
 import re
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -28,7 +29,8 @@ _BOMS = (
 _TOTAL = re.compile(
     r"(?P<title>.*?)\s*\[Total Pts: (?P<total>\d+(?:[.,]\d+)?)(?: \w+)?\]\s*(?:\|(?P<id>\w+))?", re.DOTALL
 )
-_KEYS = ("username", "user name", "identifier", "id number", "student id", "email address", "email", "full name")
+_KEYS = ("username", "user name", "identifier", "id number", "student id", "email address", "email")
+_NAMES = ("full name",)  # two students may bear the same one
 
 
 class Filled(Record, frozen=True):
@@ -41,6 +43,7 @@ class Filled(Record, frozen=True):
         without_mark: Students in both whose mark is withheld or whose submission was refused.
         only_in_book: Students in the file for whom there is no result.
         only_in_results: Results that are in no row of the file.
+        ambiguous: Students in the file for whom there is more than one result, or whose result another row claims too.
     """
 
     cells: int
@@ -49,6 +52,7 @@ class Filled(Record, frozen=True):
     without_mark: tuple[str, ...]
     only_in_book: tuple[str, ...]
     only_in_results: tuple[str, ...]
+    ambiguous: tuple[str, ...]
 
 
 class Cell(Record, frozen=True):
@@ -86,10 +90,7 @@ def fill(results: Path, download: Path, upload: Path, *, column: str = "", feedb
         written = bom + filled.encode(encoding)
     except UnicodeEncodeError:
         written = bom + filled.encode(encoding, errors="replace")  # only what was filled in can be concerned
-    try:
-        write_atomically(upload, written)
-    except OSError as error:
-        raise UsageError(f"{upload} cannot be written: {error.strerror}.") from error
+    write_atomically(upload, written)
     return done
 
 
@@ -122,7 +123,8 @@ def _fill(text: str, lines: tuple[ClassLine, ...], column: str, feedback: bool) 
     header = [cell.value.strip() for cell in rows[0]]
     plain = [name.lower() for name in header]
     keys = [plain.index(name) for name in _KEYS if name in plain]
-    if not keys:
+    names = [plain.index(name) for name in _NAMES if name in plain]
+    if not keys and not names:
         raise UsageError(
             f"The file has no column that names the student (Username or Identifier), only: {_shown(header)}."
         )
@@ -134,24 +136,27 @@ def _fill(text: str, lines: tuple[ClassLine, ...], column: str, feedback: bool) 
             "The file has no column for feedback. From Minerva, download the single column with its feedback; "
             "in Moodle, switch feedback comments on."
         )
-    known = {key.casefold(): line for line in lines for key in reversed((line.name, *line.keys)) if key}
-    used: set[str] = set()
-    without, only_in_book = [], []
+    claims = _claims(lines, rows[1:], keys) or _claims(lines, rows[1:], names)
+    claimed = Counter(line.name for found in claims.values() for line in found)
+    without, only_in_book, ambiguous = [], [], []
     edits: list[tuple[Cell, str]] = []
     marks = 0
-    for row in rows[1:]:
+    for number, row in enumerate(rows[1:]):
         values = [cell.value.strip() for cell in row]
-        names = [values[at] for at in keys if at < len(values) and values[at]]
-        if not names:
+        shown = next((values[at] for at in (*keys, *names) if at < len(values) and values[at]), "")
+        if not shown:
             continue
-        line = next((known[name.casefold()] for name in names if name.casefold() in known), None)
-        if line is None:
-            only_in_book.append(names[0])
+        found = claims.get(number, ())
+        if not found:
+            only_in_book.append(shown)
             continue
-        used.add(line.name)
+        if len(found) > 1 or claimed[found[0].name] > 1:
+            ambiguous.append(shown)
+            continue
+        line = found[0]
         out_of = _number(values[total_at]) if total_at is not None and total_at < len(values) else total
         if line.score is None or not line.max_score or mark_at >= len(row) or out_of is None:
-            without.append(names[0])
+            without.append(shown)
             continue
         edits.append((row[mark_at], _plain_number(line.score * out_of / line.max_score)))
         marks += 1
@@ -168,8 +173,24 @@ def _fill(text: str, lines: tuple[ClassLine, ...], column: str, feedback: bool) 
         total="its maximum" if total_at is not None else _plain_number(total or 0),
         without_mark=tuple(clean(name, 100) for name in without),
         only_in_book=tuple(clean(name, 100) for name in only_in_book),
-        only_in_results=tuple(line.name for line in lines if line.name not in used),
+        only_in_results=tuple(line.name for line in lines if line.name not in claimed),
+        ambiguous=tuple(clean(name, 100) for name in ambiguous),
     )
+
+
+def _claims(lines: tuple[ClassLine, ...], rows: list[list[Cell]], columns: list[int]) -> dict[int, list[ClassLine]]:
+    """For the number of each row that some result fits, the results that fit its first key in *columns* that any fits."""
+    known: dict[str, dict[str, ClassLine]] = {}
+    for line in lines:
+        for key in (line.name, *line.keys):
+            known.setdefault(key.casefold(), {})[line.name] = line
+    claims = {}
+    for number, row in enumerate(rows):
+        keys = [row[at].value.strip().casefold() for at in columns if at < len(row)]
+        found = next((known[key] for key in keys if key and key in known), None)
+        if found:
+            claims[number] = list(found.values())
+    return claims
 
 
 def _mark_column(header: list[str], plain: list[str], wanted: str) -> tuple[int, int | None, float | None]:

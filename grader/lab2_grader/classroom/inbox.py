@@ -22,15 +22,15 @@ from lab2_grader.errors import UsageError
 from lab2_grader.messages import refusal
 from lab2_grader.records import Unknown
 from lab2_grader.submission.address import is_address, name_of_address, safe_name, without_secrets
-from lab2_grader.submission.archive import SUFFIXES
-from lab2_grader.submission.bounds import CHUNK
+from lab2_grader.submission.archive import SUFFIXES, member_path, zip_names
+from lab2_grader.submission.bounds import Bounds, Destination
 from lab2_grader.text import clean
 
-TEXT_BYTES = 200_000  # of a text that comes with a submission, and of a line of a table
+TEXT_BYTES = 200_000  # of a text that comes with a submission
 TABLE_BYTES = 5_000_000
 PASSED_OVER = frozenset({"__MACOSX", ".DS_Store", "Thumbs.db", "desktop.ini", ".git", ".gitignore"})
 # Names of files in the folder of results, so that no submission's folder can bear them.
-RESERVED = frozenset({"index.html", "summary.csv", "summary.json"})
+RESERVED = frozenset({"index.html", "summary.csv", "summary.json", "faults.log"})
 
 _MALFORMED = (zipfile.BadZipFile, zlib.error, RuntimeError, NotImplementedError, ValueError, EOFError, KeyError)
 
@@ -122,15 +122,23 @@ def _folder(inbox: Path, out: Path) -> Found:
             unknown.append(Unknown(folder.name, "the folder is empty"))
         else:
             entries.append(_plain(folder, folder.name))
-    for part in rest:
-        path = Path(part.place)
-        found = (_download(path) or _table(path)) if path.is_file() else None
-        suffix = _suffix(path.name)
-        if found is not None:
+    archives = [Path(part.place) for part in rest if _suffix(part.path)]
+    downloads = [_download(path) for path in archives] if not entries else []
+    if downloads and all(downloads):
+        for found in filter(None, downloads):
             entries += found[0]
             unknown += found[1]
-        elif suffix and path.is_file():
-            entries.append(_plain(path, path.name[: -len(suffix)]))
+    else:
+        # One student's archive may not speak for another, whatever the names in it look like.
+        entries += [_plain(path, path.name[: -len(_suffix(path.name))]) for path in archives]
+    for part in rest:
+        path = Path(part.place)
+        if path in archives:
+            continue
+        table = _table(path) if path.is_file() else None
+        if table is not None:
+            entries += table[0]
+            unknown += table[1]
         else:
             unknown.append(Unknown(clean(path.name, 200), "neither a folder nor an archive (.zip, .tar.gz)"))
     return entries, unknown
@@ -151,12 +159,8 @@ def _suffix(name: str) -> str:
 
 def _download(path: Path) -> Found | None:
     """What the download *path* holds; None when it is none."""
-    if path.suffix.lower() != ".zip" or not zipfile.is_zipfile(path):
-        return None
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = [info.filename for info in archive.infolist() if not info.is_dir()]
-    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+    names = zip_names(path) if path.suffix.lower() == ".zip" else None
+    if names is None:
         return None
     wanted = [name for name in names if not PASSED_OVER.intersection(name.split("/"))]
     parts = [Part(str(path), name, name) for name in wanted]
@@ -309,40 +313,34 @@ def fetch(entry: Entry, scratch: Path) -> str:
     """What is to be taken over for *entry*: its source, or its files fetched into the new folder *scratch*.
 
     Raises:
-        RefusedError: A file is larger than may be handed in, or damaged.
-        OSError: The machine does not let us.
+        RefusedError: A file is larger than may be handed in, damaged, or has a name that is not taken in.
+        FaultError: The machine does not let us write.
+        OSError: It does not let us read.
     """
     if entry.source:
         return entry.source
-    limit = lab.limits().intake.archive_bytes
     top = scratch / "handed-in"
-    top.mkdir()
+    destination, bounds = Destination(top), Bounds()
     for part in entry.parts:
-        target = top.joinpath(*(safe for piece in part.path.split("/") if (safe := _safe_piece(piece))))
-        target.parent.mkdir(parents=True, exist_ok=True)
-        _fetch_part(part, target, limit)
+        bounds.member()
+        path = member_path(part.path, bounds) or "submission"
+        try:
+            with _opened(part) as source:
+                destination.file(path, _counted(source, part, bounds), executable=False)
+        except _MALFORMED as error:
+            raise refusal("archive-corrupt", name=part.path, detail=str(error) or type(error).__name__) from error
     only = list(top.iterdir())
     return str(only[0] if len(only) == 1 and only[0].is_file() else top)
 
 
-def _safe_piece(piece: str) -> str:
-    """A part of a path as a name for a file here; empty when it is none."""
-    return "" if piece in ("", ".", "..") else clean(piece, 200).replace("/", "_")
-
-
-def _fetch_part(part: Part, target: Path, limit: int) -> None:
-    taken = 0
-    try:
-        with _opened(part) as source, target.open("xb") as file:
-            while piece := source.read(CHUNK):
-                taken += len(piece)
-                if taken > limit:
-                    raise refusal("archive-too-large", name=part.path, limit=limit // 1_000_000)
-                file.write(piece)
-    except FileExistsError as error:
-        raise refusal("name-twice", name=part.path) from error
-    except _MALFORMED as error:
-        raise refusal("archive-corrupt", name=part.path, detail=str(error) or type(error).__name__) from error
+def _counted(source: IO[bytes], part: Part, bounds: Bounds) -> Iterator[bytes]:
+    """What *source* holds, as far as a file that is handed in may be large."""
+    taken, limit = 0, lab.limits().intake.archive_bytes
+    for piece in bounds.counted(source):
+        taken += len(piece)
+        if taken > limit:
+            raise refusal("archive-too-large", name=part.path, limit=limit // 1_000_000)
+        yield piece
 
 
 @contextmanager

@@ -60,11 +60,18 @@ def locked(out: Path) -> Iterator[None]:
         yield
 
 
-def key_of(facts: SubmissionFacts, clock: Clock) -> str:
-    """Digest of all that a result's evidence depends on: what was handed in, and the grader's code and facts."""
+def key_of(facts: SubmissionFacts, clock: Clock, ros: str, *, isolation: bool) -> str:
+    """Digest of all that a result's evidence depends on: what was handed in, how it is run, the grader's code and facts.
+
+    Args:
+        facts: What is known of the submission; where it came from does not matter.
+        clock: How the numeric pair's clock is driven.
+        ros: Which ROS was asked for: `auto`, `sourced` or `wheels`.
+        isolation: False when it ran with the caller's rights, and could have changed its own result.
+    """
     same = msgspec.structs.replace(facts, source="")
     total = hashlib.sha256(msgspec.json.encode(same))
-    total.update(f"\0{clock.value}\0{code_digest()}".encode())
+    total.update(f"\0{clock.value}\0{ros}\0{isolation}\0{code_digest()}".encode())
     return total.hexdigest()
 
 
@@ -72,7 +79,7 @@ def stamp(folder: Path) -> Stamp | None:
     """The stamp of the result in *folder*; None when there is none."""
     try:
         return msgspec.json.decode((folder / STAMP).read_bytes(), type=Stamp)
-    except (OSError, msgspec.DecodeError):
+    except (OSError, msgspec.DecodeError, UnicodeDecodeError):
         return None
 
 
@@ -85,7 +92,7 @@ def result(folder: Path) -> Result | None:
     """The result in *folder*; None when there is none that can be read."""
     try:
         return msgspec.json.decode((folder / report.RESULT).read_bytes(), type=Result)
-    except (OSError, msgspec.DecodeError):
+    except (OSError, msgspec.DecodeError, UnicodeDecodeError):
         return None
 
 

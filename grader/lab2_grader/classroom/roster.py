@@ -75,9 +75,13 @@ def read(text: str) -> tuple[tuple[Row, ...], tuple[Unknown, ...]]:
 
 
 def _rows(text: str) -> list[list[str]]:
+    """The cells of *text*, row by row; none when it is no table, as one with a cell of over 131,072 characters."""
     first = text.split("\n", 1)[0]
     delimiter = max(",;\t", key=first.count)
-    return list(csv.reader(text.splitlines(), delimiter=delimiter))
+    try:
+        return list(csv.reader(text.splitlines(), delimiter=delimiter))
+    except csv.Error:
+        return []
 
 
 def _header(cells: list[str]) -> dict[str, list[int]]:

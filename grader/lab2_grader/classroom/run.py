@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable, Iterable
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Protocol
@@ -78,6 +78,8 @@ def grade_class(order: Order, watch: Watcher) -> ClassSummary:
         FaultError: Submissions cannot be isolated here, or there is no ROS.
         KeyboardInterrupt: It was interrupted; what was finished is kept, and the next call goes on.
     """
+    if not order.inbox:
+        raise UsageError("No inbox was named. Name the folder, the download or the table of the class.")
     out = Path(order.out)
     found = inbox.look(Path(order.inbox), out, order.before)
     with results.locked(out):
@@ -150,10 +152,11 @@ class _Run:
     def _one(self, entry: Entry) -> ClassLine:
         before = False
         try:
-            line, before = self._graded(entry)
-        except RefusedError as error:
-            results.discard(self._out, entry.name)
-            line = _line(entry, ClassState.REFUSED, str(error))
+            try:
+                line, before = self._graded(entry)
+            except RefusedError as error:
+                results.discard(self._out, entry.name)
+                line = _line(entry, ClassState.REFUSED, str(error))
         except (FaultError, UsageError, OSError) as error:
             self._unless_stopped(error)
             line = _line(entry, ClassState.WITHHELD, str(error))
@@ -191,7 +194,7 @@ class _Run:
             package = scratch / "package"
             taken = submission.take(source, package, commit=entry.commit or None, before=entry.before)
             facts = msgspec.structs.replace(taken.facts, name=entry.name, source=entry.shown)
-            key = results.key_of(facts, order.clock)
+            key = results.key_of(facts, order.clock, order.ros, isolation=order.isolation)
             known = self._known(entry, key, facts)
             if known is not None:
                 return known, True
@@ -220,8 +223,9 @@ class _Run:
         return summary.line_of(entry.name, result, now, folder)
 
     def _log(self, name: str) -> None:
-        with (self._out / FAULTS).open("a") as file:
-            file.write(f"{name}\n{traceback.format_exc()}\n")
+        told = f"{name}\n{traceback.format_exc()}\n"
+        with suppress(OSError), (self._out / FAULTS).open("a", encoding="utf-8", errors="backslashreplace") as file:
+            file.write(told)
 
 
 def _line(entry: Entry, state: ClassState, reason: str) -> ClassLine:

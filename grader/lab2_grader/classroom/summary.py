@@ -56,6 +56,7 @@ def line_of(name: str, result: Result, known: Stamp, folder: Path) -> ClassLine:
             for check in result.checks
             if check.status not in (Status.PASS, Status.NOT_ASSESSED)
         ),
+        not_assessed=tuple(check.id for check in result.checks if check.status is Status.NOT_ASSESSED),
         flags=known.flags,
         note=known.note,
         shown=known.shown,
@@ -148,8 +149,9 @@ def table(summary: ClassSummary) -> str:
     writer.writerow(["name", "student", "state", "score", "max_score", "reason", "flags", "note", "commit", "sha256",
                      *checks])  # fmt: skip
     for line in summary.lines:
-        lost = {lost.check: lost.status for lost in line.lost}
-        verdicts = [lost.get(check, "pass" if line.state is ClassState.GRADED else "") for check in checks]
+        known = dict.fromkeys(line.not_assessed, Status.NOT_ASSESSED.value)
+        known |= {lost.check: lost.status for lost in line.lost}
+        verdicts = [known.get(check, "pass" if line.state is ClassState.GRADED else "") for check in checks]
         score = "" if line.score is None else str(line.score)
         texts = (line.reason, "; ".join(line.flags), line.note, line.commit or "", line.sha256)
         writer.writerow(

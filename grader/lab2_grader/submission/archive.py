@@ -162,10 +162,13 @@ class _Wary(io.RawIOBase):
         return True
 
 
-def _member_path(raw: str, bounds: Bounds) -> str:
+def member_path(raw: str, bounds: Bounds) -> str:
     """The path of a member, relative to the top, judged; backslashes, which Windows writes, separate like slashes.
 
     Empty for the top itself.
+
+    Raises:
+        RefusedError: It leads out of the archive, or is a name that is not taken in.
     """
     path = raw.replace("\\", "/")
     if path.startswith("/") or _DRIVE.match(path):
@@ -242,7 +245,7 @@ def _unpack_zip(name: str, source: BinaryIO, destination: Destination, bounds: B
             if info.flag_bits & _ENCRYPTED:
                 raise refusal("archive-encrypted", name=name)
             mode = info.external_attr >> 16
-            path = _member_path(_zip_name(info), bounds)
+            path = member_path(_zip_name(info), bounds)
             if not path or not _is_wanted(path):
                 continue
             if info.compress_type not in _READABLE_METHODS:
@@ -261,6 +264,22 @@ def _unpack_zip(name: str, source: BinaryIO, destination: Destination, bounds: B
                 with archive.open(info) as member:
                     destination.file(path, bounds.counted(member), bool(mode & stat.S_IXUSR))
     links.copy()
+
+
+def zip_names(path: Path) -> tuple[str, ...] | None:
+    """The names of the files in the zip *path*; None when it is none, or its list of members is longer than any honest one.
+
+    Raises:
+        OSError: It cannot be read.
+    """
+    with path.open("rb") as source:
+        if not zipfile.is_zipfile(source):
+            return None
+        try:
+            with zipfile.ZipFile(_Wary(source, _DIRECTORY_BYTES)) as archive:
+                return tuple(info.filename for info in archive.infolist() if not info.is_dir())
+        except (zipfile.BadZipFile, tarfile.TarError, ValueError, NotImplementedError):
+            return None
 
 
 def _count_zip_members(source: BinaryIO, bounds: Bounds) -> None:
@@ -371,7 +390,7 @@ def _unpack_tar(name: str, source: BinaryIO, destination: Destination, links_out
 def _unpack_tar_member(
     archive: tarfile.TarFile, member: tarfile.TarInfo, destination: Destination, bounds: Bounds, links: _Links
 ) -> None:
-    path = _member_path(member.name, bounds)
+    path = member_path(member.name, bounds)
     if member.isdir():
         if path and _is_wanted(path):
             destination.folder(path)
