@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import configparser
+import errno
 import functools
 import io
 import shutil
@@ -26,6 +27,7 @@ from lab2_grader.text import clean
 LOG_BYTES = 20_000  # the end of what the build printed is kept
 ENTRY_POINTS_BYTES = 100_000
 LIMITS_IN_LOG = {"No space left on device": "disk", "File too large": "file", "File size limit exceeded": "file"}
+OURS = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EMFILE, errno.ENFILE, errno.EROFS)  # no archive is at fault
 PACKAGE_INSIDE = "/package"
 LAUNCH_SUFFIXES = (".py", ".xml", ".yaml", ".yml")
 
@@ -49,7 +51,7 @@ def build(submission: Submission, into: Path, ros: Ros, isolation: sandbox.Isola
     """Build *submission* and unpack what was installed below *into*.
 
     Raises:
-        FaultError: colcon is not there or does not build anything, or the machine failed.
+        FaultError: colcon is not there or does not build anything, or the machine failed: its disk is full, say.
     """
     package = lab.specification().package
     outcome, printed = _colcon(submission.package_dir, package, into, ros, isolation)
@@ -58,6 +60,8 @@ def build(submission: Submission, into: Path, ros: Ros, isolation: sandbox.Isola
     limit = outcome.limit or printed.limit or (_unpack(printed.archive, into) if printed.archive else "")
     if not limit and outcome.code != 0:
         limit = next((name for text, name in LIMITS_IN_LOG.items() if text in log), "")
+        if limit and not isolation.on:  # there is no disk of its own that it could have filled
+            _prove(ros, isolation)
     ended_by = EndedBy.LIMIT if limit and outcome.ended_by is EndedBy.ITSELF else outcome.ended_by
     prefix = into / "install" / package
     ok = outcome.code == 0 and not limit and prefix.is_dir()
@@ -161,7 +165,11 @@ def _unpack(archive: bytes | bytearray, into: Path) -> str:
                     return "install"
                 if PurePosixPath(member.name).parts[:1] == ("install",):
                     take_out(members, member, into)
-    except (tarfile.TarError, OSError, ValueError):
+    except (tarfile.TarError, ValueError):
+        return "install"
+    except OSError as error:
+        if error.errno in OURS:
+            raise FaultError(f"What was built could not be unpacked: {error.strerror}.", "build") from error
         return "install"
     return ""
 

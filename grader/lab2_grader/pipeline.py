@@ -179,6 +179,8 @@ class _Recorder:
         self._faults: tuple[str, ...] = ()
         self._runtime = means.runtime
         self._run_seconds = 0.0
+        for name in report.NAMES:  # an earlier run's: they do not speak for this one
+            (folder / name).unlink(missing_ok=True)
         self.writer = evidence.Writer(folder / EVIDENCE)
         self.writer.submission(facts)
         self.stage("submission")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from lab2_grader import evidence
+from lab2_grader import __version__, evidence
 from lab2_grader.records import Record, Result
 
 KEY = "LAB2_GRADER_KEY"  # the environment variable with the key; whoever has it can sign, so submissions never see it
@@ -70,22 +70,23 @@ def compare(result: Result, folder: Path, again: Result, submission: str = "") -
 
 
 def _digest(what: str, recorded: str, found: str, otherwise: str) -> Finding:
-    if hmac.compare_digest(recorded, found):
+    if recorded == found:
         return Finding(what, Verified.YES, f"the {what} is the one that was graded")
     return Finding(what, Verified.NO, f"{otherwise} (recorded {recorded[:12] or 'nothing'}, found {found[:12]})")
 
 
 def _mark(result: Result, again: Result) -> Finding:
-    """The mark and every verdict, judged again: they follow from evidence and rubric alone."""
-    same = (result.graded, result.score, result.max_score) == (again.graded, again.score, again.max_score)
-    changed = [one.id for one, other in zip(result.checks, again.checks, strict=False) if one.status != other.status]
-    if same and not changed and len(result.checks) == len(again.checks):
+    """The mark, every verdict and what is said of it, judged again: all follow from evidence and rubric alone."""
+    if msgspec.structs.replace(result, digests=again.digests, signature=again.signature) == again:
         return Finding("mark", Verified.YES, "the mark follows from the evidence")
-    if result.runtime.grader != again.runtime.grader:
+    if result.runtime == again.runtime and again.runtime.grader != __version__:
         text = f"graded by version {result.runtime.grader} of the grader, which may have judged otherwise"
         return Finding("mark", Verified.UNKNOWN, text)
-    shown = ", ".join(changed) or f"{result.score} of {result.max_score}, not {again.score} of {again.max_score}"
-    return Finding("mark", Verified.NO, f"the mark does not follow from the evidence ({shown})")
+    changed = [one.id for one, other in zip(result.checks, again.checks, strict=False) if one != other]
+    shown = ", ".join(changed)
+    if (result.score, result.max_score) != (again.score, again.max_score):
+        shown = f"{result.score} of {result.max_score}, not {again.score} of {again.max_score}"
+    return Finding("mark", Verified.NO, f"the result does not follow from the evidence ({shown or 'its facts'})")
 
 
 def _signed(result: Result) -> Finding:
@@ -95,6 +96,6 @@ def _signed(result: Result) -> Finding:
         return Finding("signature", Verified.UNKNOWN, f"{said} there is no key in {KEY} to check it with")
     if not result.signature:
         return Finding("signature", Verified.NO, "the result is not signed")
-    if hmac.compare_digest(result.signature, _signature(result, key)):
+    if hmac.compare_digest(result.signature.encode(), _signature(result, key).encode()):
         return Finding("signature", Verified.YES, "the signature was made with this key")
     return Finding("signature", Verified.NO, "the signature was not made with this key, or the result was changed")

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+import traces
 from class_generator import make
 from conftest import ROOT
 from zoo_builder import Animal, animals
@@ -319,7 +320,7 @@ def test_interrupted_says_how_far_it_came_and_leaves_nothing_running(small: Path
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 130 and "Interrupted" in errors
-    wait_until(lambda: not left_running(process.pid), 5)
+    assert not traces.soon_empty(lambda: left_running(process.pid), 5)
     page = (out / "index.html").read_text()
     assert "Grading is not finished" in page
     assert not (out / results.INCOMING).exists() or not list((out / results.INCOMING).glob("*"))

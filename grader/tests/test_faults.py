@@ -9,6 +9,7 @@ import ast
 import io
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -22,7 +23,7 @@ import traces
 from zoo_builder import ROOT
 
 import lab2_grader
-from lab2_grader import pipeline, process
+from lab2_grader import pipeline, process, report
 from lab2_grader.observe.observer import BLIND_SECONDS, Observer
 from lab2_grader.observe.recorder import Recorder
 from lab2_grader.records import Limits, Request, Result, Status
@@ -190,6 +191,51 @@ def test_no_space_for_the_results(size: int, means: pipeline.Means, tmp_path: Pa
         assert json.loads(partial.read_text())["graded"] is False
     assert size == 8_192 or partial.exists()
     assert not list(kept.rglob("*.draft"))
+
+
+UNPACK = """
+import io, sys, tarfile
+from pathlib import Path
+from lab2_grader import build
+archive = io.BytesIO()
+with tarfile.open(fileobj=archive, mode="w") as tar:
+    member = tarfile.TarInfo("install/lab2/large")
+    member.size = 400_000
+    tar.addfile(member, io.BytesIO(bytes(member.size)))
+print(build._unpack(archive.getvalue(), Path(sys.argv[1])))
+"""
+
+
+def test_no_space_for_what_was_built_is_not_the_students_fault(means: pipeline.Means, tmp_path: Path) -> None:
+    _needs_walls(means)
+    small = tmp_path / "small"
+    small.mkdir()
+    around = ("bwrap", "--dev-bind", "/", "/", "--size", "131072", "--tmpfs", str(small), "--")
+    run = subprocess.run(
+        [*around, sys.executable, "-c", UNPACK, str(small)],
+        env=os.environ | {"PYTHONPATH": str(ROOT / "grader")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "FaultError" in run.stderr and "No space left on device" in run.stderr
+
+
+def test_what_an_earlier_run_said_does_not_outlive_it(
+    solution_graded: tuple[Result, Path], means: pipeline.Means, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(solution_graded[1], out)
+    assert all((out / name).exists() for name in report.NAMES)
+
+    def stop(doing: str) -> None:
+        if "building" in doing:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        pipeline.grade(str(ROOT / "solution"), out, means, stop)
+    left = [name for name in report.NAMES if (out / name).exists()]
+    assert left == [report.RESULT] and json.loads((out / report.RESULT).read_bytes())["graded"] is False
 
 
 def test_the_folder_for_the_results_is_read_only(means: pipeline.Means, tmp_path: Path) -> None:

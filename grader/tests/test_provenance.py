@@ -67,6 +67,12 @@ def test_digests_are_of_what_was_graded(folder: Path) -> None:
     [
         pytest.param(lambda value: value.update(score=value["score"] + 1), id="mark"),
         pytest.param(lambda value: value["checks"][3].update(status="fail"), id="verdict"),
+        pytest.param(lambda value: value["checks"][3].update(points=99), id="points"),
+        pytest.param(lambda value: value["checks"][3].update(hint="Well done."), id="hint"),
+        pytest.param(lambda value: value["notes"].append("All is well."), id="notes"),
+        pytest.param(lambda value: value["runtime"].update(grader="0.0.1"), id="version"),
+        pytest.param(lambda value: value["submission"].update(name="somebody"), id="name"),
+        pytest.param(lambda value: value["digests"].update(evidence="\u00e9" * 64), id="digest-not-ascii"),
         pytest.param(lambda value: value["digests"].update(evidence="0" * 64), id="evidence"),
         pytest.param(lambda value: value["digests"].update(submission="0" * 64), id="submission"),
         pytest.param(lambda value: value["digests"].update(rubric="0" * 64), id="rubric"),
@@ -116,8 +122,8 @@ def test_a_signed_result_that_was_changed_is_found_out(
     """Whoever changes evidence, digests and mark so that they fit each other still lacks the key."""
     _sign(folder, KEY, monkeypatch)
     result = pipeline.read(folder)[0]
-    renamed = msgspec.structs.replace(result.submission, name="somebody-else")
-    forged = msgspec.structs.replace(result, submission=renamed)
+    _change(folder / "evidence" / "submission.json", lambda value: value.update(name="somebody-else"))
+    forged = msgspec.structs.replace(pipeline.rescore(folder, lab.rubric()), signature=result.signature)
     (folder / "result.json").write_bytes(msgspec.json.encode(forged))
     assert verify(str(folder))[0] == 0
     assert verify(str(folder), key=KEY)[0] == 1
@@ -142,3 +148,19 @@ def test_what_is_no_result(tmp_path: Path, verify: Callable[..., tuple[int, str]
     assert verify(str(tmp_path))[0] == 2
     (tmp_path / "result.json").write_text("{}")
     assert verify(str(tmp_path))[0] == 2
+
+
+def test_another_version_of_the_grader_may_judge_otherwise(
+    folder: Path, verify: Callable[..., tuple[int, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(provenance, "__version__", "99.0")
+    assert verify(str(folder))[0] == 0  # it judges as that one did
+    _change(folder / "result.json", lambda value: value["checks"][3].update(hint="Said otherwise then."))
+    code, said = verify(str(folder))
+    assert code == 0 and "not checked" in said and "may have judged otherwise" in said
+
+
+def test_a_signature_that_is_no_signature(folder: Path, verify: Callable[..., tuple[int, str]]) -> None:
+    _change(folder / "result.json", lambda value: value.update(signature="\u00e9"))
+    code, said = verify(str(folder), key=KEY)
+    assert code == 1 and "not made with this key" in said

@@ -53,6 +53,7 @@ def test_all_is_well(tmp_path: Path, package: str) -> None:
         pushed=True,
         products=(),
         products_count=0,
+        committed="2026-10-05T12:00:00+00:00",
     )
 
 
@@ -428,7 +429,8 @@ def test_an_address_gives_the_default_branch(tmp_path: Path) -> None:
     assert taken.facts.source == f"file://{bare}"
     assert taken.facts.name == "in-origin"
     assert taken.facts.commit == git(repository, "rev-parse", "HEAD")
-    assert taken.facts.git == GitFacts(taken.facts.commit, (f"file://{bare}",), WORK, (), True, (), 0)
+    made = "2026-10-05T12:00:00+00:00"
+    assert taken.facts.git == GitFacts(taken.facts.commit, (f"file://{bare}",), WORK, (), True, (), 0, made)
 
 
 def test_an_address_gives_what_is_committed_not_the_working_tree(tmp_path: Path) -> None:
@@ -740,6 +742,21 @@ def test_an_address_that_cannot_be_reached_is_not_the_students_fault(tmp_path: P
         with pytest.raises(FaultError) as caught:
             take(address, tmp_path / "out")
     assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize("asked", ["rev-parse", "for-each-ref", "ls-tree", "ls-files"])
+def test_git_that_is_killed_is_not_the_students_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: str
+) -> None:
+    repository = pushed_repository(tmp_path / "in")
+    write(repository, {"lab2/new.py": ""})
+    real = shutil.which("git")
+    wrapper = tmp_path / "bin" / "git"
+    write(wrapper.parent, {"git": f'#!/bin/sh\ncase "$*" in *{asked}*) kill -9 $$;; esac\nexec {real} "$@"\n'})
+    wrapper.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{wrapper.parent}:{os.environ['PATH']}")
+    with pytest.raises(FaultError, match="git was ended by signal 9"):
+        take(str(repository), tmp_path / "out")
 
 
 def test_git_that_is_missing_is_our_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

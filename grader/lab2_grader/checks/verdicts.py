@@ -69,8 +69,9 @@ def not_assessed(check: str, key: str) -> Verdict:
 
 
 def inconclusive(check: str, key: str, **values: messages.Value) -> Verdict:
-    """The grader or the machine failed; *values* fill the reason."""
-    observed = messages.status(key, **values)
+    """The grader or the machine failed; *values* fill the reason, sentences among them without their full stop."""
+    inner = {name: value.rstrip(".") if isinstance(value, str) else value for name, value in values.items()}
+    observed = messages.status(key, **inner)
     return Verdict(check, Status.INCONCLUSIVE, message=key, expected=_expected(check), observed=observed)
 
 

@@ -41,10 +41,11 @@ _TOO_LARGE = re.compile(
 
 @dataclass(frozen=True)
 class Clone:
-    """A commit taken from an address, its files in `folder`."""
+    """A commit taken from an address, made at the time `committed` (ISO 8601, or empty), its files in `folder`."""
 
     folder: Path
     commit: str
+    committed: str
     tree: Tree
 
 
@@ -82,7 +83,7 @@ def take_commit(address: str, scratch: Path, commit: str | None, before: datetim
     if sum(blob.size for blob in tree.blobs) > intake.unpacked_bytes:
         raise refusal("too-large", limit=intake.unpacked_bytes // 1_000_000)
     _write_out(git, found, tree, address)
-    return Clone(scratch / "commit", found, tree)
+    return Clone(scratch / "commit", found, git.committed(found), tree)
 
 
 def _write_out(git: Git, commit: str, tree: Tree, address: str) -> None:

@@ -10,6 +10,7 @@ import os
 import shutil
 import stat
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 from lab2_grader import lab, process
@@ -128,7 +129,7 @@ class Git:
             )
         )
         if outcome.ended_by is EndedBy.DEADLINE:
-            raise refusal("repository-timeout", seconds=intake.clone_seconds)
+            raise refusal("repository-timeout", seconds=round(intake.clone_seconds))
         return outcome
 
     def _environment(self) -> tuple[tuple[str, str], ...]:
@@ -152,10 +153,31 @@ class Git:
         }
         return tuple(own.items())
 
+    def ask(self, *arguments: str, keep: int = _LOG_BYTES, work_tree: Path | None = None) -> Outcome:
+        """Run git and hear its answer, which may be a no; as `run` otherwise.
+
+        Raises:
+            RefusedError: It took too long.
+            FaultError: It was ended before it could answer.
+        """
+        outcome = self.run(*arguments, keep=keep, work_tree=work_tree)
+        if outcome.code is None:
+            why = f"the limit on {outcome.limit}" if outcome.limit else f"signal {outcome.signal}"
+            raise FaultError(f"git was ended by {why} while it read the repository.", "submission")
+        return outcome
+
     def lines(self, *arguments: str) -> list[str] | None:
-        """The lines that git prints; None when it fails."""
-        outcome = self.run(*arguments)
+        """The lines that git answers; None when the answer is no. Raises as `ask` does."""
+        outcome = self.ask(*arguments)
         return text(outcome.stdout).splitlines() if outcome.code == 0 else None
+
+    def committed(self, commit: str) -> str:
+        """When *commit* was made, as it says itself: ISO 8601 with its time zone, or empty when it says nothing of the kind."""
+        said = "".join(self.lines("log", "--max-count=1", "--format=%cI", commit) or ())
+        try:
+            return datetime.fromisoformat(said.replace("Z", "+00:00")).isoformat()
+        except ValueError:
+            return ""
 
     def attribute_nothing(self) -> None:
         """Turn off whatever attributes can ask for, in this repository."""
@@ -223,7 +245,7 @@ def settings_of(theirs: Path, git: Git) -> dict[str, list[str]] | None:
     if not _is_file(path) or path.stat().st_size > _CONFIG_BYTES:
         return None
     pattern = r"^(remote\..*\.(url|pushurl)|extensions\..*)$"
-    found = git.run("config", f"--file={path.absolute()}", "--no-includes", "--null", "--get-regexp", pattern)
+    found = git.ask("config", f"--file={path.absolute()}", "--no-includes", "--null", "--get-regexp", pattern)
     if found.code not in (0, 1):  # 1: nothing there
         return None
     settings: dict[str, list[str]] = {}
@@ -259,9 +281,10 @@ def list_tree(git: Git, commit: str) -> Tree | None:
     """The files of *commit*; None when its objects cannot be read.
 
     Raises:
-        RefusedError: They are too many.
+        RefusedError: They are too many, or git took too long.
+        FaultError: git was ended before it could answer.
     """
-    listing = git.run("ls-tree", "-r", "-z", "-l", "--full-tree", commit, keep=LISTING_BYTES)
+    listing = git.ask("ls-tree", "-r", "-z", "-l", "--full-tree", commit, keep=LISTING_BYTES)
     if listing.dropped_bytes:
         raise refusal("too-many-files", limit=lab.limits().intake.members)
     if listing.code != 0:

@@ -36,6 +36,7 @@ def facts(top: Path, package_path: str, package: Path, files: tuple[str, ...], s
 
     Raises:
         RefusedError: Reading it took too long.
+        FaultError: git was ended before it could answer.
     """
     if not is_folder(top / ".git"):
         return None
@@ -60,6 +61,7 @@ def facts(top: Path, package_path: str, package: Path, files: tuple[str, ...], s
         pushed=bool(branches),
         products=tuple(clean(path, _NAME_LENGTH) for path in made[:_LISTED]),
         products_count=len(made),
+        committed=git.committed(commit) if commit else "",
     )
 
 
@@ -75,6 +77,7 @@ def facts_of(clone: Clone, address: str, package_path: str) -> GitFacts:
         pushed=True,
         products=tuple(clean(path, _NAME_LENGTH) for path in made[:_LISTED]),
         products_count=len(made),
+        committed=clone.committed,
     )
 
 
@@ -127,7 +130,7 @@ def _is_same(file: Path, blob: Blob) -> bool:
 def _not_ignored(git: Git, top: Path, package_path: str) -> frozenset[str]:
     """The files of the package that no `.gitignore` hides; a repository inside is a name with a slash at its end."""
     within = () if package_path == "." else ("--", f":(top,literal){package_path}")
-    listing = git.run(
+    listing = git.ask(
         "ls-files", "--others", "--exclude-standard", "-z", *within, keep=LISTING_BYTES, work_tree=top.resolve()
     )
     return frozenset(text(listing.stdout).split("\0"))
