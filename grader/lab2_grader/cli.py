@@ -49,8 +49,20 @@ GRADED, BELOW, USAGE, NOT_GRADED, INTERRUPTED = 0, 1, 2, 3, 130
 PLAIN_WIDTH = 110  # columns when the output is no terminal
 LOG = "lab2-grader-fault.log"
 
-out = Console(highlight=False, width=None if sys.stdout.isatty() else PLAIN_WIDTH)
-err = Console(stderr=True, highlight=False, soft_wrap=True)
+
+class _Console(Console):
+    """A console whose reader may go away: what was asked for is done all the same, and ends with its own exit code."""
+
+    def on_broken_pipe(self) -> None:
+        """Say nothing more."""
+        self.quiet = True
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, self.file.fileno())
+        os.close(nowhere)
+
+
+out = _Console(highlight=False, width=None if sys.stdout.isatty() else PLAIN_WIDTH)
+err = _Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -69,12 +81,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except Lab2Error as error:
         err.print(Text(github.defused(str(error))), soft_wrap=True)
         return error.exit_code
-    except BrokenPipeError:
-        return NOT_GRADED
     except Exception:
         told = f"lab2-grader {__version__}, Python {sys.version}\n\n{traceback.format_exc()}"
         try:
-            Path(LOG).write_text(told)
+            Path(LOG).write_text(told, encoding="utf-8", errors="backslashreplace")
         except OSError:
             err.print(Text(told))
         err.print(f"The grader itself failed; no mark was given. Send the file {LOG} to whoever maintains it.")
@@ -304,8 +314,11 @@ def _report(arguments: argparse.Namespace) -> int:
     else:
         text = report.FORMATS[arguments.format](shown)
     if arguments.output is None:
-        sys.stdout.buffer.write(text.encode("utf-8", "replace"))
-        sys.stdout.flush()
+        try:
+            sys.stdout.buffer.write(text.encode("utf-8", "replace"))
+            sys.stdout.flush()
+        except BrokenPipeError:
+            out.on_broken_pipe()
     else:
         evidence.write_atomically(arguments.output, text.encode("utf-8", "replace"))
     return GRADED

@@ -303,6 +303,13 @@ class Process:
         ignored = [number for number in ASKS_TO_END if signal.getsignal(number) is signal.SIG_IGN]
         if ignored:
             argv = ("env", *(f"--default-signal={number.name.removeprefix('SIG')}" for number in ignored), *argv)
+        self._wake_lock = threading.Lock()
+        self._wake_write: int | None
+        try:
+            self._wake_read, self._wake_write = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
+        except OSError as error:
+            self._remove_group()
+            raise FaultError(f"{self._shown} could not be started: {error.strerror}.") from error
         try:
             self._popen = subprocess.Popen(
                 argv,
@@ -314,15 +321,19 @@ class Process:
                 start_new_session=True,
             )
         except OSError as error:
-            if self._group is not None:
-                self._group.remove()
-            raise FaultError(f"{request.argv[0]} could not be started: {error.strerror}.") from error
+            os.close(self._wake_read)
+            os.close(self._wake_write)
+            self._remove_group()
+            raise FaultError(f"{self._shown} could not be started: {error.strerror}.") from error
         self.pid = self._popen.pid
-        self._wake_write: int | None
-        self._wake_read, self._wake_write = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
-        self._wake_lock = threading.Lock()
         self._pump = threading.Thread(target=self._run, name=f"pump-{self.pid}", daemon=True)
-        self._pump.start()
+        try:
+            self._pump.start()
+        except RuntimeError as error:  # no thread is to be had: nobody would stop it
+            self._kill_rest()
+            self._popen.wait()
+            self._tidy_up()
+            raise FaultError(f"{self._shown} could not be watched: {error}.") from error
 
     def _make_group(self) -> cgroup.Group | None:
         """A control group with the request's limits; None when the kernel no longer lets us, so that it is watched."""
@@ -334,6 +345,10 @@ class Process:
             group.remove()
             return None
         return group
+
+    def _remove_group(self) -> None:
+        if self._group is not None:
+            self._group.remove()
 
     @property
     def running(self) -> bool:
@@ -402,8 +417,7 @@ class Process:
             if stream is not None:
                 with contextlib.suppress(OSError):
                     stream.close()
-        if self._group is not None:
-            self._group.remove()
+        self._remove_group()
         if self._base is not None:
             cgroup.sweep(self._base, f"{cgroup.PREFIX}{self._name}-")
 
@@ -415,12 +429,14 @@ class Process:
         watched = bool(limits.processes or limits.memory_bytes or limits.cpu_seconds)
         next_watch = self._began + POLL_SECONDS
         ended_at: float | None = None
-        with selectors.DefaultSelector() as selector:
+        with contextlib.ExitStack() as closing:
+            selector = closing.enter_context(selectors.DefaultSelector())
             for stream, name in ((self._popen.stdout, "stdout"), (self._popen.stderr, "stderr")):
                 os.set_blocking(stream.fileno(), False)
                 selector.register(stream, selectors.EVENT_READ, name)
             selector.register(self._wake_read, selectors.EVENT_READ, "wake")
             pidfd = os.pidfd_open(self.pid)
+            closing.callback(os.close, pidfd)
             selector.register(pidfd, selectors.EVENT_READ, "end")
             open_streams = 2
             while True:
@@ -452,7 +468,6 @@ class Process:
                     elif not self._take(key.data, key.fd):
                         selector.unregister(key.fileobj)
                         open_streams -= 1
-            os.close(pidfd)
         if self._announcement and self._ended_by is EndedBy.ITSELF:
             lines = self._before.decode(errors="replace").strip().splitlines()
             said = lines[-1] if lines else f"exit code {self._popen.returncode}"

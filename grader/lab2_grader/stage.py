@@ -18,6 +18,7 @@ import msgspec
 
 from lab2_grader import lab, process, sandbox
 from lab2_grader.build import without_function
+from lab2_grader.errors import FaultError
 from lab2_grader.evidence import SceneEntry, Writer, events
 from lab2_grader.records import (
     Build,
@@ -92,7 +93,13 @@ class _Observer:
                 memory_bytes=OBSERVER_MEMORY_BYTES + lab.limits().resources.memory_bytes,
             ),
         )
-        self._process = process.Process(sandbox.private_network(request, isolation), self._on_output, keep_stdin=True)
+        try:
+            confined = sandbox.private_network(request, isolation)
+            self._process = process.Process(confined, self._on_output, keep_stdin=True)
+        except FaultError:
+            if self._domain is not None:
+                self._domain.close()
+            raise
 
     def _on_output(self, stream: str, data: bytes) -> None:
         if stream == "stderr":
@@ -143,6 +150,9 @@ class Stage:
         home: A private directory for the observers.
         clock: How the numeric pair is to be driven.
         seed: Of the numbers that are made up; None for the machine's own randomness.
+
+    Raises:
+        FaultError: An observer cannot be started.
     """
 
     def __init__(
@@ -161,7 +171,11 @@ class Stage:
         self._clock = clock
         self._random = random.Random(seed)  # noqa: S311 - numbers to look for, no secrets
         self._observers: list[_Observer] = []
-        self._waiting = [self._observer() for _ in range(EARLY_OBSERVERS)]
+        try:
+            self._waiting = [self._observer() for _ in range(EARLY_OBSERVERS)]
+        except FaultError:
+            self._dismiss_all()
+            raise
 
     def _observer(self) -> _Observer:
         observer = _Observer(self._ros, self._isolation, self._home)

@@ -99,6 +99,52 @@ def test_rescoring_gives_the_same_bytes(tmp_path: Path) -> None:
     assert (tmp_path / "out/result.json").read_bytes() == before
 
 
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (("explain",), 0),
+        (("report", "{result}"), 0),
+        (("report", "{result}", "--format", "junit"), 0),
+        (("verify", "x"), 2),
+    ],
+)
+def test_a_reader_who_goes_away_changes_no_exit_code(
+    solution_graded: tuple[object, Path], tmp_path: Path, arguments: tuple[str, ...], code: int
+) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    asked = [argument.format(result=solution_graded[1]) for argument in arguments]
+    with open(writing, "wb") as gone:
+        done = subprocess.run(
+            [sys.executable, "-m", "lab2_grader", *asked],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": str(ROOT / "grader")},
+            stdout=gone,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr and "BrokenPipe" not in done.stderr
+
+
+def test_the_wheels_can_be_asked_for_whatever_is_sourced(tmp_path: Path) -> None:
+    pytest.importorskip("ros_wheels_bootstrapper", reason="the wheels are not here")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "grader"), "ROS_DISTRO": "humble", "AMENT_PREFIX_PATH": "/x"}
+    (tmp_path / "ros2").write_text("#!/bin/sh\n")
+    (tmp_path / "ros2").chmod(0o755)
+    environment["PATH"] = f"{tmp_path}:{environment['PATH']}"
+    code = "import sys; from lab2_grader import ros; print(ros.find(sys.argv[1]).kind)"
+    found = {
+        wanted: subprocess.run(
+            [sys.executable, "-c", code, wanted], env=environment, capture_output=True, text=True, check=False
+        )
+        for wanted in ("wheels", "auto")
+    }
+    assert found["wheels"].stdout == "wheels\n", found["wheels"].stderr
+    assert "ROS 2 humble is sourced here" in found["auto"].stderr
+
+
 def test_explain_tells_every_check(tmp_path: Path) -> None:
     done = run("explain", cwd=tmp_path)
     assert done.returncode == 0

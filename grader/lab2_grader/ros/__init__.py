@@ -122,10 +122,11 @@ def find(wanted: str = "auto") -> Ros:
         wanted: `auto`, `sourced` or `wheels`.
 
     Raises:
-        UsageError: *wanted* is not to be had here.
+        UsageError: *wanted* is not to be had here, or another distribution of ROS is sourced than the lab's.
         FaultError: Neither is there.
     """
-    sourced, wheels = _sourced(), _wheels()
+    sourced = None if wanted == "wheels" else _sourced()  # whatever is sourced does not matter then
+    wheels = _wheels()
     if wanted == "sourced" and sourced is None:
         raise UsageError(
             "ROS 2 is not sourced in this terminal. Run `source /opt/ros/jazzy/setup.bash` first, or use --ros wheels."
