@@ -39,7 +39,6 @@ class Course(Record, frozen=True):
     solutions_url: str
     solutions_release: date
     grader_install_url: str
-    course_organisations: tuple[str, ...]
     workspace: str
     ros_distro: str
     fail_workflow_on_lost_points: bool
@@ -254,8 +253,8 @@ class _Symptoms(Record, frozen=True):
     symptom: tuple[Symptom, ...]
 
 
-def _read(path: Path, kind: type[T]) -> T:
-    """Decode *path* as *kind*.
+def read(path: Path, kind: type[T]) -> T:
+    """Decode the file of facts *path* as *kind*.
 
     Raises:
         UsageError: It cannot be read, is no TOML, or has a key or value that is not allowed; the text names it.
@@ -278,19 +277,19 @@ def _where(path: Path, error: str) -> str:
 @functools.cache
 def course() -> Course:
     """The facts of this year's course."""
-    return _read(FACTS / "course.toml", Course)
+    return read(FACTS / "course.toml", Course)
 
 
 @functools.cache
 def specification() -> Specification:
     """What the worksheet asks of the package."""
-    return _read(FACTS / "specification.toml", Specification)
+    return read(FACTS / "specification.toml", Specification)
 
 
 @functools.cache
 def limits() -> AllLimits:
     """Budgets of time and limits of resources."""
-    return _read(FACTS / "limits.toml", AllLimits)
+    return read(FACTS / "limits.toml", AllLimits)
 
 
 def rubric(path: Path | None = None) -> Rubric:
@@ -300,9 +299,9 @@ def rubric(path: Path | None = None) -> Rubric:
         UsageError: The file does not validate; the text names the line.
     """
     own = FACTS / "rubric.toml"
-    found = _read(path or own, Rubric)
+    found = read(path or own, Rubric)
     if path is not None:
-        _refuse_odd_rubric(path, found, {check.id for check in _read(own, Rubric).check})
+        _refuse_odd_rubric(path, found, {check.id for check in read(own, Rubric).check})
     return found
 
 
@@ -390,4 +389,4 @@ def symptoms() -> tuple[Symptom, ...]:
         except (KeyError, ValueError, IndexError) as error:
             raise UsageError(f"symptoms.toml: {row.id} names a fact that there is not: {error}.") from error
 
-    return tuple(filled(row) for row in _read(FACTS / "symptoms.toml", _Symptoms).symptom)
+    return tuple(filled(row) for row in read(FACTS / "symptoms.toml", _Symptoms).symptom)

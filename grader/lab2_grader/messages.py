@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 
-import msgspec
 
 from lab2_grader import lab
 from lab2_grader.errors import RefusedError
@@ -71,8 +70,12 @@ Value = str | int | float
 
 @functools.cache
 def catalogue() -> Catalogue:
-    """The catalogue."""
-    return msgspec.toml.decode((lab.FACTS / "messages.toml").read_bytes(), type=Catalogue)
+    """The catalogue.
+
+    Raises:
+        UsageError: It is not as it must be; the text names the place.
+    """
+    return lab.read(lab.FACTS / "messages.toml", Catalogue)
 
 
 def fill(text: str, **values: Value) -> str:

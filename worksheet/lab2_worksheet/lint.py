@@ -189,7 +189,6 @@ def stray_facts() -> list[str]:
         course.template_clone_url,
         course.solutions_url,
         course.grader_install_url,
-        *course.course_organisations,
     } - {""}
     found = []
     for path in sources():

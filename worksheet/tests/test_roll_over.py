@@ -139,6 +139,7 @@ def grade(copy: Path, submission: Path) -> dict[str, Any]:
         ("course", r"^week = .*", "week = 77", "week"),
         ("course", r"^solutions_release = .*", "solutions_release = 2019-01-01", "solutions_release"),
         ("course", r"^contact_email = .*", 'contact_email = "nobody"', "contact_email"),
+        ("messages", r"^blocked = .*", "blocked = 3", "status"),
     ],
 )
 def test_what_cannot_follow_is_refused(copy: Path, file: str, pattern: str, replacement: str, said: str) -> None:

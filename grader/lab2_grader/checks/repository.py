@@ -37,11 +37,8 @@ def git_pushed(view: View, earlier: Earlier) -> Verdict:
 
 
 def _is_course_remote(address: str) -> bool:
-    """Whether *address* is the repository that was handed out: the course's organisation and the template's name."""
-    template = _path(lab.course().template_clone_url)
-    organisations = {organisation.lower() for organisation in lab.course().course_organisations}
-    path = _path(address)
-    return path == template and path.split("/")[0] in organisations
+    """Whether *address* is the repository that was handed out."""
+    return _path(address) == _path(lab.course().template_clone_url)
 
 
 def _path(address: str) -> str:
