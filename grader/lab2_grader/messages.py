@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 
-
 from lab2_grader import lab
 from lab2_grader.errors import RefusedError
 from lab2_grader.records import Record

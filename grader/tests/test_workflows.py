@@ -73,7 +73,9 @@ def test_feedback_asks_for_little_and_comes_from_the_labs_facts() -> None:
     workflow = load(FEEDBACK)
     assert workflow["permissions"] == {"contents": "read"}
     assert workflow["concurrency"]["cancel-in-progress"] is True
-    assert set(workflow[True]) == {"push", "workflow_dispatch"} and workflow[True]["push"] == {"paths-ignore": ["**.md"]}
+    assert set(workflow[True]) == {"push", "workflow_dispatch"} and workflow[True]["push"] == {
+        "paths-ignore": ["**.md"]
+    }
     (job,) = workflow["jobs"].values()
     assert job["timeout-minutes"] == 10
     assert workflow["env"]["GRADER"] == lab.course().grader_install_url
