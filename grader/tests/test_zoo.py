@@ -22,7 +22,6 @@ ANIMALS = SINGLE | PAIRS
 
 
 NORMAL = frozenset(msgspec.toml.decode((zoo_builder.HERE / "zoo_normal.toml").read_bytes())["normal"])
-WATCHED = ("solution",)  # in real time in the normal run; all others in `make test-slow`
 
 
 def _parameters(animals: dict[str, Animal]) -> list[object]:
@@ -104,7 +103,9 @@ def test_gets_its_verdicts(zoo: Zoo, name: str) -> None:
     assert result.score == sum(c.max_points for c in result.checks if c.status is Status.PASS)
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=[] if n in WATCHED else [pytest.mark.slow]) for n in SINGLE])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[] if a.agrees else [pytest.mark.slow]) for name, a in SINGLE.items()]
+)
 def test_real_time_agrees(real_time_zoo: Zoo, name: str) -> None:
     assert not complaints(ANIMALS[name], real_time_zoo.result(name).checks)
 
