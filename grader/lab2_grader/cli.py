@@ -195,7 +195,7 @@ def _grade(arguments: argparse.Namespace) -> int:
         for outlet in outlets:
             _print_lines(outlet.began())
         means = _means(arguments)
-        with _Progress(arguments.submission) as progress:
+        with _Progress() as progress:
             result, folder = pipeline.grade(arguments.submission, destination, means, progress, publish)
     except Exception as error:
         for outlet in outlets:
@@ -398,8 +398,7 @@ def _explain(arguments: argparse.Namespace) -> int:
 class _Progress:
     """One line that says what is being done and for how long; plain lines when not on a terminal."""
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self) -> None:
         self._began = time.monotonic()
         self._spinner = Spinner("dots")
         self._live = Live(self, console=err, transient=True, refresh_per_second=8) if err.is_terminal else None

@@ -29,8 +29,6 @@ from lab2_grader.errors import FaultError, UsageError
 from lab2_grader.records import ClassLine, ClassState, ClassSummary, Clock, Lost, SubmissionFacts, Unknown
 from lab2_grader.report import class_page
 
-TWO_FAULTS = "step-two"
-
 
 class Watched:
     """Remembers what a class said of itself."""

@@ -48,11 +48,6 @@ def inline(text: str) -> Markup:
     return Markup(_parser().renderInline(text))
 
 
-def plain(text: str) -> str:
-    """A line of Markdown without its marks, for labels that are read out."""
-    return re.sub(r"[`*]", "", text)
-
-
 def headings(page: str) -> list[tuple[int, str, Markup]]:
     """Level, anchor and content of the headings of level 2 and 3 in a page of HTML."""
     found: list[Any] = re.findall(r'<h([23]) id="([^"]+)"[^>]*>(.*?)</h\1>', page, re.DOTALL)

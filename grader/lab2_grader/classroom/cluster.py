@@ -107,7 +107,7 @@ class Cluster:
                 else:
                     return graded
         except self._distributed.KilledWorker as error:
-            lost = Graded(b"", conclusive=False, fault=f"Two workers were lost while they graded it ({error}).")
+            lost = Graded(b"", fault=f"Two workers were lost while they graded it ({error}).")
             return msgspec.msgpack.encode(lost)
         except (CancelledError, OSError) as error:
             if self._stopping:

@@ -19,7 +19,6 @@ LANES_FOR_EACH_JOB = 4  # submissions at once that wait in real time do not need
 IDLE_ENOUGH = 0.25  # of the machine, for one more than the jobs
 EXTRA_EVERY_SECONDS = 2.0  # by then the last one that was let in shows in how busy the machine is
 LOOK_SECONDS = 0.25
-TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
 KEPT = "lab2-cleaner"  # removes a temporary directory: not to be killed with the rest
 
 Item = TypeVar("Item")
@@ -65,7 +64,6 @@ class Gate:
         self._inside = 0
         self._lock = threading.Lock()
         self._busy, self._total = ticks()
-        self._last_extra = 0.0
         self._looked = time.monotonic()
 
     @contextlib.contextmanager
@@ -101,7 +99,7 @@ class Gate:
 
 
 def ticks() -> tuple[int, int]:
-    """(busy, all) processor time of the machine since it started; `TICKS_A_SECOND` of them are a second."""
+    """(busy, all) processor time of the machine since it started, in the kernel's ticks."""
     values = [int(value) for value in Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:9]]
     return sum(values) - values[3] - values[4], sum(values)
 

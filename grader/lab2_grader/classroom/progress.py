@@ -37,7 +37,6 @@ class Progress:
         self._from_before = 0
         self._running: dict[str, tuple[str, float]] = {}
         self._ends: deque[float] = deque(maxlen=RECENT)
-        self._again = 0
 
     # --- what happens ------------------------------------------------------------------------
 
@@ -72,7 +71,6 @@ class Progress:
     def again(self, names: tuple[str, ...]) -> None:
         """These were inconclusive and are tried once more, one by one."""
         with self._lock:
-            self._again += 1
             for name in names:
                 self._ended.pop(name, None)
         if self._say:

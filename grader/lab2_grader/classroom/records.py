@@ -87,13 +87,11 @@ class Graded(Record, frozen=True):
 
     Args:
         result: The folder of the result as a tar; empty when there is none.
-        conclusive: A mark was given.
         flags: What a person should look at: limits that the submission struck.
         fault: What of ours failed, as a sentence; empty when nothing did.
     """
 
     result: bytes
-    conclusive: bool
     flags: tuple[str, ...] = ()
     fault: str = ""
 

@@ -112,7 +112,7 @@ def perform(task: bytes, doing: Doing = lambda _: None) -> bytes:
     try:
         graded = _perform(msgspec.msgpack.decode(task, type=Task), doing)
     except (Lab2Error, OSError, MemoryError, msgspec.MsgspecError) as error:
-        graded = Graded(b"", conclusive=False, fault=str(error) or type(error).__name__)
+        graded = Graded(b"", fault=str(error) or type(error).__name__)
     return msgspec.msgpack.encode(graded)
 
 
@@ -127,9 +127,9 @@ def _perform(task: Task, doing: Doing) -> Graded:
         package.mkdir()
         unpack(task.package, package)
         taken = Submission(task.facts, str(package))
-        result = pipeline.grade_taken(taken, scratch, folder, means, doing, began)
+        pipeline.grade_taken(taken, scratch, folder, means, doing, began)
         flags = struck(evidence.read(folder / pipeline.EVIDENCE))
-        return Graded(pack(folder), result.graded, flags)
+        return Graded(pack(folder), flags)
 
 
 def means_of(rubric: Rubric, clock: Clock, wanted_ros: str, *, isolation: bool) -> pipeline.Means:

@@ -45,7 +45,6 @@ class Conversation:
         expected: What should have come, as many.
         departure: Index of the first number that is not the expected one; None when there is none.
         total: How many came in all.
-        source: In which scene.
     """
 
     topic: str
@@ -53,7 +52,6 @@ class Conversation:
     expected: tuple[int, ...]
     departure: int | None
     total: int
-    source: str
 
 
 @dataclass(frozen=True)
@@ -79,7 +77,7 @@ class Timeline:
 def conversation(view: View) -> Conversation | None:
     """The numbers of the talker; None when it published none."""
     messages = [message for message in view.numbers if isinstance(message.data, int | float)]
-    if not messages or view.talking is None:
+    if not messages:
         return None
     numbered = [message.number for message in messages]
     observed: list[float | None] = []
@@ -100,7 +98,6 @@ def conversation(view: View) -> Conversation | None:
         expected=expected,
         departure=first_departure(observed, expected),
         total=len(messages),
-        source=SCENE_TITLES[view.talking.scene.name],
     )
 
 
@@ -146,14 +143,13 @@ def graph_observed(view: View) -> Graph | None:
     played = [scene for scene in scenes if scene is not None]
     if not played:
         return None
-    return _ObservedGraph(view, played).graph()
+    return _ObservedGraph(played).graph()
 
 
 class _ObservedGraph:
     """Puts together what was seen and what was asked."""
 
-    def __init__(self, view: View, scenes: Sequence[SceneView]) -> None:
-        self._view = view
+    def __init__(self, scenes: Sequence[SceneView]) -> None:
         self._endpoints = list(
             {
                 (endpoint.node, endpoint.kind, endpoint.topic, endpoint.type): endpoint
