@@ -211,15 +211,10 @@ def _dangling(prefix: Path, package: str) -> tuple[str, ...]:
     for point in _entry_points(prefix):
         module = point.target.split(":")[0].strip()
         path = _site_packages(prefix).joinpath(*module.split("."))
-        own = module.split(".")[0] == package or point.name in _programs()
+        own = module.split(".")[0] == package or point.name in lab.specification().programs
         if own and not (path.is_dir() or path.with_name(f"{path.name}.py").is_file()):
             found.append(point.name)
     return tuple(sorted(found))
-
-
-def _programs() -> frozenset[str]:
-    pairs = lab.specification()
-    return frozenset((pairs.original.talker, pairs.original.listener, pairs.numeric.talker, pairs.numeric.listener))
 
 
 def without_function(build: Build, installed: Path) -> frozenset[str]:

@@ -64,6 +64,11 @@ class Pair(Record, frozen=True):
     listener: str
     launch_file: str
 
+    @property
+    def programs(self) -> tuple[str, str]:
+        """The talker and the listener."""
+        return self.talker, self.listener
+
 
 class TextTopic(Record, frozen=True):
     """The topic with greetings; `period_seconds` is that of the talker as handed out."""
@@ -100,6 +105,17 @@ class Specification(Record, frozen=True):
     numeric: Pair
     text_topic: TextTopic
     number_topic: NumberTopic
+
+    @property
+    def programs(self) -> tuple[str, ...]:
+        """The four programs by name, the numeric pair first."""
+        return *self.numeric.programs, *self.original.programs
+
+    @property
+    def work(self) -> tuple[str, ...]:
+        """The files that students write: their paths within the package."""
+        modules = (f"{self.package}/{name}.py" for name in self.numeric.programs)
+        return *modules, f"launch/{self.numeric.launch_file}"
 
 
 class IntakeLimits(Record, frozen=True):

@@ -43,21 +43,20 @@ def launched(name: str, build: Build) -> str:
 
 def misdirected(name: str, build: Build) -> str:
     """The module that the entry point *name* names although it is another program's, and its own is there; else empty."""
-    pairs = lab.specification()
-    programs = {pairs.original.talker, pairs.original.listener, pairs.numeric.talker, pairs.numeric.listener}
+    specification = lab.specification()
     for point in build.entry_points:
-        module = point.target.partition(":")[0].strip().removeprefix(f"{pairs.package}.")
-        if point.name == name and name in build.modules and module in programs - {name}:
+        module = point.target.partition(":")[0].strip().removeprefix(f"{specification.package}.")
+        if point.name == name and name in build.modules and module in {*specification.programs} - {name}:
             return module
     return ""
 
 
 def _nearest(name: str, candidates: Iterable[str]) -> str:
-    pairs = lab.specification()
-    taken = {pairs.original.talker, pairs.original.listener, pairs.numeric.talker, pairs.numeric.listener}
-    free = sorted(set(candidates) - taken - {"__init__"})
+    specification = lab.specification()
+    taken = specification.programs
+    free = sorted(set(candidates) - {*taken, "__init__"})
     if found := nearest(name, free, taken):
         return found
-    words, others = ROLES if name == pairs.numeric.talker else reversed(ROLES)
+    words, others = ROLES if name == specification.numeric.talker else reversed(ROLES)
     of_role = [c for c in free if any(w in c.lower() for w in words) and not any(w in c.lower() for w in others)]
     return of_role[0] if len(of_role) == 1 else ""

@@ -42,7 +42,7 @@ def launch_starts(view: View, earlier: Earlier) -> Verdict:
     build = view.build
     assert build is not None
     started = scene.started()
-    pair = {name: launched(name, build) for name in (numeric.talker, numeric.listener)}
+    pair = {name: launched(name, build) for name in numeric.programs}
     missing = [name for name, executable in pair.items() if executable not in started]
     if not missing:
         return passed(check)
@@ -50,7 +50,7 @@ def launch_starts(view: View, earlier: Earlier) -> Verdict:
         return inconclusive(check, "inconclusive-unseen", name=names(unseen))
     error = launch_error(scene)
     if asked := NO_EXECUTABLE.search(error):
-        if asked[1] in (numeric.talker, numeric.listener):
+        if asked[1] in numeric.programs:
             return blocked(check, "entry-points")
         file, line = source.written_in(view, _launch_source(view), asked[1])
         return failed(check, "no-executable", file, line, asked=asked[1], found=names(build.executables))

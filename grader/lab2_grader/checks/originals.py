@@ -26,7 +26,7 @@ def originals_kept(view: View, earlier: Earlier) -> Verdict:
         return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
     if scene.unsupported:
         return inconclusive(check, "inconclusive-unsupported", what=scene.unsupported[0].what)
-    pair = (original.talker, original.listener)
+    pair = original.programs
     started = scene.started()
     missing = [name for name in pair if name not in started]
     if not missing and not scene.spoke(topic.name, original.talker):

@@ -69,9 +69,8 @@ def entry_points(view: View, earlier: Earlier) -> Verdict:
     """Executables `numeric_talker` and `numeric_listener` exist; `talker` and `listener` still do."""
     check, build, specification = "entry-points", view.build, view.specification
     assert build is not None
-    original = (specification.original.talker, specification.original.listener)
-    numeric = (specification.numeric.talker, specification.numeric.listener)
-    missing = [name for name in (*numeric, *original) if name not in build.executables]
+    original, numeric = specification.original.programs, specification.numeric.programs
+    missing = [name for name in specification.programs if name not in build.executables]
     found = names(build.executables)
     if missing:
         if not build.executables and build.entry_points:
@@ -80,19 +79,19 @@ def entry_points(view: View, earlier: Earlier) -> Verdict:
         if lost and len(lost) == len(missing):
             return failed(check, "replaced", name=lost[0], missing=names(lost), found=found)
         for name in (name for name in missing if name in numeric):
-            if near := nearest(name, build.executables, (*numeric, *original)):
+            if near := nearest(name, build.executables, specification.programs):
                 file, line = source.written_in(view, "setup.py", near)
                 return failed(check, "near", file, line, name=name, near=near)
         file, line = source.written_in(view, "setup.py", "console_scripts")
         return failed(check, "missing", file, line, name=missing[0], missing=names(missing), found=found)
     targets = {point.name: point.target for point in build.entry_points}
-    for name in (*numeric, *original):
+    for name in specification.programs:
         if name in build.dangling:
             return _dangling(view, build, name, targets[name])
         if module := misdirected(name, build):
             file, line = source.written_in(view, "setup.py", targets[name])
             return failed(check, "wrong-module", file, line, name=name, target=targets[name], module=module)
-    for name in (*numeric, *original):
+    for name in specification.programs:
         if name in targets and _function_is_missing(view, name, targets[name]):
             file, line = source.written_in(view, "setup.py", targets[name])
             return failed(check, "function", file, line, name=name, target=targets[name])

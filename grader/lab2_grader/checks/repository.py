@@ -21,9 +21,7 @@ def git_pushed(view: View, earlier: Earlier) -> Verdict:
     if git.commit is None:
         return failed(check, "no-commit")
     if not git.committed_work:
-        numeric, package = view.specification.numeric, view.specification.package
-        wanted = (f"{package}/{numeric.talker}.py", f"{package}/{numeric.listener}.py", f"launch/{numeric.launch_file}")
-        return failed(check, "no-work", missing=names(wanted))
+        return failed(check, "no-work", missing=names(view.specification.work))
     if not git.remotes:
         return failed(check, "no-remote")
     own = [remote for remote in git.remotes if not _is_course_remote(remote)]

@@ -10,8 +10,7 @@ def known(check: str) -> dict[str, messages.Value]:
     """The lab's names and numbers as the sentences of *check* may use them."""
     specification, course = lab.specification(), lab.course()
     numbers, texts = specification.number_topic, specification.text_topic
-    original, numeric = specification.original, specification.numeric
-    pair = original if check == "originals-kept" else numeric
+    pair = specification.original if check == "originals-kept" else specification.numeric
     topic = texts if check.endswith("chatter") or check == "originals-kept" else numbers
     return messages.limits() | {
         "package": specification.package,
@@ -29,7 +28,7 @@ def known(check: str) -> dict[str, messages.Value]:
         "topic": topic.name,
         "name": topic.name.lstrip("/"),
         "type": topic.type,
-        "wanted": f"{numeric.talker}, {numeric.listener}, {original.talker}, {original.listener}",
+        "wanted": ", ".join(specification.programs),
     }
 
 

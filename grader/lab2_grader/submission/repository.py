@@ -87,14 +87,8 @@ def _prefix(package_path: str) -> str:
 
 def _committed_work(paths: Iterable[str], package_path: str) -> tuple[str, ...]:
     """Those files of the exercise that are among *paths*, relative to the package."""
-    asked = lab.specification()
-    work = (
-        f"{asked.package}/{asked.numeric.talker}.py",
-        f"{asked.package}/{asked.numeric.listener}.py",
-        f"launch/{asked.numeric.launch_file}",
-    )
     held = frozenset(paths)
-    return tuple(path for path in work if _prefix(package_path) + path in held)
+    return tuple(path for path in lab.specification().work if _prefix(package_path) + path in held)
 
 
 def _uncommitted(
