@@ -12,7 +12,6 @@ from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
 from lab2_grader.reading import numbers_in, said
 from lab2_grader.records import Message, SceneName, Status, Verdict
-from lab2_grader.stand_in import launched
 
 Earlier = Mapping[str, Verdict]
 
@@ -36,14 +35,13 @@ def launch_starts(view: View, earlier: Earlier) -> Verdict:
     check, scene = "launch-starts", view.scene(SceneName.CONVERSATION)
     if scene is None:
         return _no_launch_file(view)
-    if fault := _our_fault(check, scene):
+    if fault := our_fault(check, scene):
         return fault
     numeric = view.specification.numeric
     build = view.build
     assert build is not None
     started = scene.started()
-    pair = {name: launched(name, build) for name in numeric.programs}
-    missing = [name for name, executable in pair.items() if executable not in started]
+    missing = [name for name, own in zip(numeric.programs, view.pair, strict=True) if own not in started]
     if not missing:
         return passed(check)
     if unseen := [name for name in missing if name in scene.said_to_have_died()]:
@@ -86,22 +84,18 @@ def launch_only_numeric(view: View, earlier: Earlier) -> Verdict:
     check, scene = "launch-only-numeric", view.scene(SceneName.CONVERSATION)
     if scene is None:
         return blocked(check, "launch-starts")
-    if fault := _our_fault(check, scene):
+    if fault := our_fault(check, scene):
         return fault
-    build = view.build
-    assert build is not None
-    pair = view.specification.numeric
-    numeric = (launched(pair.talker, build), launched(pair.listener, build))
     started = scene.started()
-    others = [name for name in (*started, *scene.started_besides()) if name not in numeric]
+    others = [name for name in (*started, *scene.started_besides()) if name not in view.pair]
     if others:
         file, line = source.written_in(view, _launch_source(view), others[0])
         return failed(check, "others", file, line, others=names(others))
     if not started or launch_error(scene):
         return blocked(check, *(earlier["launch-starts"].because or ("launch-starts",)))
     # Two of one in the place of the other is one fault, and launch-starts has it.
-    twice = [name for name in numeric if started.get(name, 0) > 1 and not _respawned(scene, name)]
-    if twice and all(name in started for name in numeric):
+    twice = [name for name in view.pair if started.get(name, 0) > 1 and not _respawned(scene, name)]
+    if twice and all(name in started for name in view.pair):
         return failed(check, "twice", others=names(twice))
     return passed(check)
 
@@ -110,7 +104,7 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
     """In the launched pair, what the talker says comes out of the listener."""
     check, scene = "launch-conversation", view.scene(SceneName.CONVERSATION)
     starts = earlier["launch-starts"]
-    if starts.status is Status.INCONCLUSIVE and scene is not None and (fault := _our_fault(check, scene)):
+    if starts.status is Status.INCONCLUSIVE and scene is not None and (fault := our_fault(check, scene)):
         return fault
     if starts.status is Status.BLOCKED:
         return blocked(check, *starts.because)
@@ -122,9 +116,8 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
     printed = _printed(view, scene, spoken)
     answered = [message for message in spoken if message.data in printed]
     listener = earlier["listener-numeric"]
-    build, numeric, topic = view.build, view.specification.numeric, view.specification.number_topic.name
-    assert build is not None
-    talker, own_listener = launched(numeric.talker, build), launched(numeric.listener, build)
+    topic = view.specification.number_topic.name
+    talker, own_listener = view.pair
     theirs = scene.spoke(topic, talker) and scene.heard(topic, own_listener)
     if theirs and _is_conversation(spoken, answered) and listener.message not in NOT_WHAT_IT_RECEIVES:
         return passed(check)
@@ -178,12 +171,8 @@ def _printed(view: View, scene: SceneView, spoken: list[Message]) -> dict[int, f
 
     Lines and messages reach the grader on different ways and in no sure order, so lines are counted, not timed.
     """
-    build = view.build
-    assert build is not None
     topic = view.specification.text_topic.name
-    talker, listener = (
-        launched(name, build) for name in (view.specification.numeric.talker, view.specification.numeric.listener)
-    )
+    talker, listener = view.pair
     sources = {line.source for line in scene.lines}
     # Processes that a launch file starts with `ros2 run` are all labelled `ros2`.
     sources = {listener} if listener in sources else sources - {"launch", talker}
@@ -203,7 +192,8 @@ def _is_conversation(spoken: list[Message], answered: list[Message]) -> bool:
     return answered == spoken[spoken.index(answered[0]) :]
 
 
-def _our_fault(check: str, scene: SceneView) -> Verdict | None:
+def our_fault(check: str, scene: SceneView) -> Verdict | None:
+    """Why nothing can be said of a launch: it uses what the grader cannot play, or the grader failed; None when neither."""
     if scene.unsupported:
         return inconclusive(check, "inconclusive-unsupported", what=scene.unsupported[0].what)
     if scene.scene.fault:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from lab2_grader import messages
 from lab2_grader.checks import source
-from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
+from lab2_grader.checks.verdicts import blocked, failed, inconclusive, no_program, passed
 from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
 from lab2_grader.reading import numbers_in, said
@@ -25,8 +25,7 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
     check = "listener-numeric"
     scene = view.scene(SceneName.LISTENER)
     if scene is None:
-        misplaced = earlier["entry-points"].message == "misplaced"
-        return blocked(check, "entry-points") if misplaced else failed(check, "missing")
+        return no_program(check, earlier)
     if scene.scene.fault:
         return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
     topic = view.specification.number_topic

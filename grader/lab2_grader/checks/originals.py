@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from lab2_grader import lab
-from lab2_grader.checks.launch import launch_error
-from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
+from lab2_grader.checks.launch import launch_error, our_fault
+from lab2_grader.checks.verdicts import blocked, failed, passed
 from lab2_grader.checks.view import View, names
 from lab2_grader.records import SceneName, Verdict
 
@@ -22,10 +22,8 @@ def originals_kept(view: View, earlier: Earlier) -> Verdict:
     assert build is not None
     if scene is None:
         return failed(check, "no-launch")
-    if scene.scene.fault:
-        return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
-    if scene.unsupported:
-        return inconclusive(check, "inconclusive-unsupported", what=scene.unsupported[0].what)
+    if fault := our_fault(check, scene):
+        return fault
     pair = original.programs
     started = scene.started()
     missing = [name for name in pair if name not in started]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from lab2_grader.checks import source
 from lab2_grader.checks.sequence import Sequel, Step, around
-from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
+from lab2_grader.checks.verdicts import blocked, failed, inconclusive, no_program, passed
 from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
 from lab2_grader.records import SceneName, Status, Verdict
@@ -23,8 +23,7 @@ def talker_type(view: View, earlier: Earlier) -> Verdict:
     check = "talker-type"
     scene = view.talking
     if scene is None:
-        misplaced = earlier["entry-points"].message == "misplaced"
-        return blocked(check, "entry-points") if misplaced else failed(check, "missing")
+        return no_program(check, earlier)
     if scene.scene.fault:
         return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
     topic = view.specification.number_topic

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from lab2_grader import lab, messages
 from lab2_grader.records import Status, Verdict
 
@@ -60,6 +62,12 @@ def blocked(check: str, *because: str) -> Verdict:
     """Another check failed, so this one could not show."""
     observed = messages.status("blocked", because=", ".join(because))
     return Verdict(check, Status.BLOCKED, expected=_expected(check), observed=observed, because=because)
+
+
+def no_program(check: str, earlier: Mapping[str, Verdict]) -> Verdict:
+    """There was no program to run: its file lies in the wrong folder, which has its own check, or is not there."""
+    misplaced = earlier["entry-points"].message == "misplaced"
+    return blocked(check, "entry-points") if misplaced else failed(check, "missing")
 
 
 def not_assessed(check: str, key: str) -> Verdict:

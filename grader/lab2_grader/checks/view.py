@@ -181,12 +181,18 @@ class View:
         return self.scene(SceneName.TALKER) or self.scene(SceneName.CONVERSATION)
 
     @cached_property
+    def pair(self) -> tuple[str, str]:
+        """(talker, listener): the executables that a launch file has to start; the worksheet's names where nothing was built."""
+        numeric = self.specification.numeric
+        if self.build is None:
+            return numeric.programs
+        return launched(numeric.talker, self.build), launched(numeric.listener, self.build)
+
+    @cached_property
     def talker_name(self) -> str:
         """The executable or module that stood for the talker."""
-        scene, name = self.talking, self.specification.numeric.talker
-        if scene is not None and scene.scene.label:
-            return scene.scene.label
-        return launched(name, self.build) if self.build else name
+        label = self.talking.scene.label if self.talking else ""
+        return label or self.pair[0]
 
     @cached_property
     def number_publishers(self) -> list[Endpoint]:

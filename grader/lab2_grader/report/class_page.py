@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import functools
 from collections import Counter
-from pathlib import Path
 from urllib.parse import quote
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment
 from markupsafe import Markup
 
 from lab2_grader.records import CheckRate, ClassLine, ClassState, ClassSummary, Record
+from lab2_grader.report.pages import TEMPLATES, environment
 
-TEMPLATES = Path(__file__).parent / "templates"
 STEPS = 10  # bars of the distribution: 0 to 9 %, … 90 to 99 %, and 100 %
 
 STATES = {
@@ -100,13 +99,7 @@ def _rate(check: CheckRate) -> float:
 
 @functools.cache
 def _environment() -> Environment:
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    filling = environment(trim=True)
     own = {name: (TEMPLATES / f"class.{name}").read_text() for name in ("css", "js")}
-    environment.globals |= {name: Markup(text) for name, text in own.items()}  # noqa: S704 - files of ours
-    return environment
+    filling.globals |= {name: Markup(text) for name, text in own.items()}  # noqa: S704 - files of ours
+    return filling

@@ -5,20 +5,19 @@ from __future__ import annotations
 import functools
 import re
 from dataclasses import dataclass
-from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment
 from markupsafe import Markup, escape
 
 from lab2_grader import lab, messages
 from lab2_grader.checks.verdicts import known
 from lab2_grader.report.observed import Conversation, Graph, Timeline
+from lab2_grader.report.pages import TEMPLATES, environment
 from lab2_grader.report.pictures import PICTURE_CSS, Mark, graph_svg, sequence_svg, timeline_svg
 from lab2_grader.report.view import Report
 from lab2_grader.report.words import STATUS_MARKS, STATUS_WORDS, in_short, left_out, mark
 from lab2_grader.sections import section_link, symptom_link
 
-TEMPLATES = Path(__file__).parent / "templates"
 WIDE, NARROW = 760, 350  # CSS pixels
 CODE = re.compile("`([^`]+)`")
 
@@ -53,21 +52,16 @@ def html(report: Report) -> str:
 
 @functools.cache
 def _environment() -> Environment:
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-    )
-    environment.filters |= {"code": code, "instant": instant}
-    environment.globals |= {
+    filling = environment(trim=False)
+    filling.filters |= {"code": code, "instant": instant}
+    filling.globals |= {
         "css": Markup((TEMPLATES / "report.css").read_text() + PICTURE_CSS),
         "words": STATUS_WORDS,
         "marks": STATUS_MARKS,
         "say": messages.report,
         "judged": _judged,
     }
-    return environment
+    return filling
 
 
 def code(text: str) -> Markup:
