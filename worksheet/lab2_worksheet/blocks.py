@@ -12,6 +12,7 @@ from typing import Any
 
 from jinja2 import Environment
 from lab2_grader import lab
+from lab2_grader.checks.verdicts import known
 from lab2_grader.lab import RubricCheck
 from lab2_grader.messages import catalogue
 from lab2_grader.sections import section_anchor
@@ -24,6 +25,7 @@ from lab2_worksheet.manifest import Command, Task, commands, questions, tasks
 from lab2_worksheet.recording import recording
 from lab2_worksheet.release import in_words
 
+CODE = ("file", "listener", "name", "number_topic", "talker", "text_topic", "topic", "type")  # names that a program knows
 CANARY = "staff-only-9c1f"  # stands in every staff block, and must stand nowhere in what students get
 
 
@@ -41,21 +43,7 @@ def checks_of(section: str) -> tuple[RubricCheck, ...]:
 
 def judged(check: RubricCheck) -> str:
     """How a check is judged, and the ruling where the worksheet is silent: the words of the grader's own catalogue."""
-    spec = lab.specification()
-    about_text = check.id in ("talker-chatter", "listener-chatter", "originals-kept")
-    topic = spec.text_topic.name if about_text else spec.number_topic.name
-    number = spec.number_topic
-    names = {
-        "package": spec.package,
-        "topic": f"`{topic}`",
-        "smallest": number.smallest,
-        "largest": number.largest,
-        "before": number.largest - 1,
-        "above": number.largest + 1,
-        "file": f"`{spec.original.launch_file}`",
-        "talker": f"`{spec.original.talker}`",
-        "listener": f"`{spec.original.listener}`",
-    }
+    names = {key: f"`{value}`" if key in CODE else value for key, value in known(check.id).items()}
     texts = catalogue().check[check.id]
     return f"{texts.judged} {texts.ruling}".format_map(names)
 
