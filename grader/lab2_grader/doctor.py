@@ -9,22 +9,21 @@ from __future__ import annotations
 import os
 import resource
 import shutil
-import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from lab2_grader import lab, messages, process, sandbox
+from lab2_grader import lab, messages, process, ros, sandbox
+from lab2_grader.classroom.pool import memory_free
+from lab2_grader.errors import Lab2Error
 from lab2_grader.records import Limits, Record, Request
+from lab2_grader.ros.domains import SAFE
+from lab2_grader.submission import products
 from lab2_grader.text import clean
 
-PRODUCTS = ("build", "install", "log")
-DOMAINS = range(
-    102
-)  # those whose ports are free on Linux whatever else runs (ROS 2 documentation, "The ROS_DOMAIN_ID")
 NESTED_DEPTH = 3
-ENOUGH_MEMORY = 1_000_000_000
-ENOUGH_DISK = 1_000_000_000
+ENOUGH_MEMORY = 1_000_000_000  # bytes
+ENOUGH_DISK = 1_000_000_000  # bytes
 ENOUGH_PROCESSES = 500
 NAME_LENGTH = 200
 
@@ -129,7 +128,7 @@ def look_around(
         container=_container(variables),
         distro=variables.get("ROS_DISTRO", ""),
         ros2=shutil.which("ros2", path=path) or "",
-        wheels=Path(sys.prefix, "share", "ament_index").is_dir(),
+        wheels=_has_wheels(),
         workspace=lab.course().workspace,
         workspace_there=workspace.is_dir(),
         workspace_built=(installed / package).is_dir(),
@@ -147,9 +146,16 @@ def look_around(
         isolation=sandbox.probe(),
         keeper=sandbox.limits_kept_by(),
         processes=_process_limit(),
-        memory=_free_memory(),
+        memory=memory_free(),
         disk=shutil.disk_usage(tempfile.gettempdir()).free,
     )
+
+
+def _has_wheels() -> bool:
+    try:
+        return bool(ros.find("wheels"))
+    except Lab2Error:
+        return False
 
 
 def _terminal(pid: int, name: str, variables: Mapping[str, str]) -> Terminal:
@@ -201,14 +207,10 @@ def _products(folder: Path, workspace: Path) -> tuple[str, ...]:
         place / name
         for place in dict.fromkeys(places)
         if place != workspace and not (place / "src").is_dir()
-        for name in PRODUCTS
-        if (place / name).is_dir() and _made_by_colcon(place / name)
+        for name in sorted(products.COLCON)
+        if (place / name).is_dir() and products.is_made_by_colcon(name, os.listdir(place / name))
     ]
     return tuple(clean(str(path), NAME_LENGTH) for path in found)
-
-
-def _made_by_colcon(folder: Path) -> bool:
-    return any((folder / mark).exists() for mark in ("COLCON_IGNORE", ".colcon_install_layout", "latest"))
 
 
 def _repositories(folder: Path) -> tuple[str, ...]:
@@ -235,13 +237,6 @@ def _can_import_rclpy(python: str, variables: Mapping[str, str]) -> bool:
 def _process_limit() -> int:
     soft, _ = resource.getrlimit(resource.RLIMIT_NPROC)
     return 0 if soft == resource.RLIM_INFINITY else soft
-
-
-def _free_memory() -> int:
-    for line in Path("/proc/meminfo").read_text().splitlines():
-        if line.startswith("MemAvailable:"):
-            return int(line.split()[1]) * 1024
-    return 0
 
 
 # --- judging ------------------------------------------------------------------------------------
@@ -311,7 +306,7 @@ def _workspace(found: Surroundings) -> Finding:
 
 def _domain(found: Surroundings) -> Finding:
     domain = found.here.domain or "0"
-    return _finding("domain", domain.isdigit() and int(domain) in DOMAINS, domain=domain, largest=DOMAINS[-1])
+    return _finding("domain", domain.isdigit() and int(domain) in SAFE, domain=domain, largest=SAFE[-1])
 
 
 def _range(found: Surroundings) -> Finding:
@@ -357,6 +352,9 @@ def _limits(found: Surroundings) -> Finding:
         "memory": f"{found.memory / 1e9:.1f}",
         "disk": f"{found.disk / 1e9:.1f}",
         "temporary": tempfile.gettempdir(),
+        "enough_processes": ENOUGH_PROCESSES,
+        "enough_memory": f"{ENOUGH_MEMORY / 1e9:g}",
+        "enough_disk": f"{ENOUGH_DISK / 1e9:g}",
     }
     if found.processes and found.processes < ENOUGH_PROCESSES:
         return _finding("limits", False, "processes", **values)

@@ -12,7 +12,16 @@ import msgspec
 import pytest
 
 from lab2_grader import cli, lab, messages, sandbox
-from lab2_grader.doctor import Finding, Surroundings, Terminal, examine, look_around
+from lab2_grader.doctor import (
+    ENOUGH_DISK,
+    ENOUGH_MEMORY,
+    ENOUGH_PROCESSES,
+    Finding,
+    Surroundings,
+    Terminal,
+    examine,
+    look_around,
+)
 
 WELL = Surroundings(
     container="Singularity",
@@ -81,6 +90,15 @@ def test_each_illness_has_its_cure(changed: dict[str, object], what: str, mend: 
     assert mend in found[what].mend and found[what].found and found[what].wanted
 
 
+def test_what_is_enough_is_said_in_numbers() -> None:
+    least = {"processes": ENOUGH_PROCESSES, "memory": ENOUGH_MEMORY, "disk": ENOUGH_DISK}
+    assert all(finding.well for finding in examine(msgspec.structs.replace(WELL, **least)))
+    for name, enough in least.items():
+        ill = next(f for f in examine(msgspec.structs.replace(WELL, **{name: enough - 1})) if not f.well)
+        assert ill.what == "Limits"
+        assert f"{ENOUGH_PROCESSES} processes, {ENOUGH_MEMORY // 10**9} GB" in ill.wanted
+
+
 def test_every_sentence_of_the_catalogue_is_reached_and_names_a_row_that_there_is() -> None:
     said = set()
     for changed, _, _ in UNWELL:
@@ -106,6 +124,9 @@ def home(tmp_path: Path) -> Path:
         folder.mkdir(parents=True)
     for folder in (package / "build", tmp_path / "ros2_ws" / "build", tmp_path / "ros2_ws" / "install"):
         (folder / "COLCON_IGNORE").touch()
+    (package / "log").mkdir()  # of a package's own: an ordinary word
+    (package / "install").mkdir()
+    (package / "install" / "local_setup.bash").touch()  # all that some clean-up left of colcon's
     (tmp_path / ".ssh").mkdir()
     (tmp_path / ".ssh" / "id_ed25519.pub").touch()
     return tmp_path
@@ -121,6 +142,8 @@ def test_it_sees_what_is_there(home: Path) -> None:
     found = found_in(home, ROS_DISTRO="jazzy", ROS_DOMAIN_ID="3")
     package = home / "ros2_ws" / "src" / "lab2"
     assert not found["Build folders"].well and str(package / "build") in found["Build folders"].found
+    assert str(package / "install") in found["Build folders"].found
+    assert str(package / "log") not in found["Build folders"].found
     assert str(home / "ros2_ws" / "build") not in found["Build folders"].found
     assert not found["Git"].well and str(home / "ros2_ws") in found["Git"].found
     assert found["SSH key"].well and "id_ed25519.pub" in found["SSH key"].found

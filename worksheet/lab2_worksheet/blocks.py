@@ -25,7 +25,7 @@ from lab2_worksheet.manifest import Command, Task, commands, questions, tasks
 from lab2_worksheet.recording import recording
 from lab2_worksheet.release import in_words
 
-CODE = ("file", "listener", "name", "number_topic", "talker", "text_topic", "topic", "type")  # names that a program knows
+CODE = ("file", "listener", "name", "number_topic", "talker", "text_topic", "topic", "type")  # shown as code
 CANARY = "staff-only-9c1f"  # stands in every staff block, and must stand nowhere in what students get
 
 

@@ -63,7 +63,12 @@ def is_left_out_for(name: str, children: Collection[str]) -> bool:
     held = frozenset(children)
     if _ENVIRONMENT_MARK in held or held >= _RESULT_MARKS:
         return True
-    return name in COLCON and not held.isdisjoint(_COLCON_MARKS)
+    return is_made_by_colcon(name, held)
+
+
+def is_made_by_colcon(name: str, children: Collection[str]) -> bool:
+    """A folder called *name* that holds *children* is colcon's, wherever it lies."""
+    return name in COLCON and not _COLCON_MARKS.isdisjoint(children)
 
 
 def committed(paths: Iterable[str], package_path: str) -> tuple[str, ...]:
