@@ -12,9 +12,12 @@ from typing import get_type_hints
 
 import msgspec
 
-from lab2_grader import evidence, records
+from lab2_grader import evidence, pipeline, records, report
+from lab2_grader.classroom import results, run, summary
+from lab2_grader.classroom.records import Stamp
 
-HEAD = """# What stands on disk, field by field
+STUDENTS, GITHUB, PROGRAMS, STAFF, RESULT = (f"`{name}`" for name in report.NAMES)
+HEAD = f"""# What stands on disk, field by field
 
 Made from the records in `lab2_grader/records.py` and `lab2_grader/evidence.py` by `docs/make_formats.py`; a test holds that it
 is up to date. Times within a scene (`at`) are seconds since that scene began. Whatever text comes from a submission has been
@@ -24,16 +27,23 @@ A result's folder holds
 
 | file | what it is |
 |---|---|
-| `result.json` | the mark: a `Result` |
-| `report.html`, `report.md`, `junit.xml` | the same for students, for GitHub and for other programs |
-| `staff.html` | for staff only: it shows what students must not see |
-| `evidence/evidence.json` | the `Manifest`: how far the run came, and which scenes there are; its `schema` is `{evidence}` |
-| `evidence/submission.json` | a `SubmissionFacts` |
-| `evidence/build.json` | a `Build` |
-| `evidence/<scene>.jsonl` | what was observed in a scene, one row a line: a JSON array whose first element names the kind of row |
+| {RESULT} | the mark: a `Result` |
+| {STUDENTS}, {GITHUB}, {PROGRAMS} | the same for students, for GitHub and for other programs |
+| {STAFF} | for staff only: it shows what students must not see |
+| `{pipeline.EVIDENCE}/{evidence.MANIFEST}` | the `Manifest`: how far the run came, and which scenes there are |
+| `{pipeline.EVIDENCE}/{evidence.SUBMISSION}` | a `SubmissionFacts` |
+| `{pipeline.EVIDENCE}/{evidence.BUILD}` | a `Build`, once the build has ended |
+| `{pipeline.EVIDENCE}/<scene>.jsonl` | what was observed in a scene, one row a line: a JSON array whose first element names the kind of row |
 
-Evidence of another version is refused by name. A class's folder holds one such folder for each submission, and `summary.json`,
-a `ClassSummary`.
+Evidence of another version is refused by name. A class's folder holds
+
+| file | what it is |
+|---|---|
+| `<name>/` | a result's folder for each submission, named after whose it is |
+| `<name>/{results.STAMP}` | a `Stamp` |
+| `{summary.PAGE}`, `{summary.CSV}` | the overview for people, and as a table |
+| `{summary.JSON}` | the overview for programs: a `ClassSummary` |
+| `{run.FAULTS}` | only where the grader itself failed: which submissions it failed on, and how |
 """
 PARTS = {
     "The result": (records.Result, records.SubmissionResult, records.ItemResult, records.CheckResult, records.Runtime,
@@ -43,7 +53,7 @@ PARTS = {
     "The rows of a scene": (records.Phase, records.Endpoint, records.Message, records.Line, records.Tick, records.Sent,
                             records.ProcessSeen, records.ProcessGone, records.ProgramEnded, records.Measured,
                             records.Unsupported),
-    "The class": (records.ClassSummary, records.ClassLine, records.Lost, records.CheckRate, records.CommonFault,
+    "The class": (Stamp, records.ClassSummary, records.ClassLine, records.Lost, records.CheckRate, records.CommonFault,
                   records.Unknown),
     "Words": (records.Status, records.Clock, records.SceneName, records.EndedBy, records.ClassState),
 }  # fmt: skip
@@ -79,13 +89,14 @@ def described(record: type) -> str:
         kind = kind or str(hints[field.name])
         kind = re.sub(r"[\w]+\.", "", kind).replace("|", "or")
         meaning = meanings.get(field.name, "").replace("|", "\\|")
+        meaning = re.sub(r"\w+_SCHEMA", lambda found: getattr(records, found[0]), meaning)
         lines.append(f"| {field.encode_name} | {kind} | {meaning} |")
     return "\n".join([*lines, ""])
 
 
 def formats() -> str:
     """The whole page."""
-    parts = [HEAD.format(evidence=records.EVIDENCE_SCHEMA)]
+    parts = [HEAD]
     for title, kinds in PARTS.items():
         parts += [f"## {title}", "", *(described(kind) for kind in kinds)]
     return "\n".join(parts)

@@ -108,7 +108,7 @@ class SourceFile(Record, frozen=True):
 
     Args:
         path: Relative to the package.
-        text: What stands in it, cut at the limit.
+        text: What stands in it, whole: a file above the limit is left out.
     """
 
     path: str
@@ -588,7 +588,7 @@ class CheckResult(Record, frozen=True):
         title: What it asks, for people.
         status: The verdict.
         points: Points given.
-        max_points: Points that it could give; 0 when it was not assessed.
+        max_points: Points that it could give; when it was not assessed, the sums leave them out.
         expected: What is asked, in a sentence.
         observed: What was seen instead; empty when it passed.
         hint: What to do next; empty when it passed.

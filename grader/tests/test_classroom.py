@@ -20,6 +20,7 @@ import pytest
 import traces
 from class_generator import make
 from conftest import ROOT
+from test_formats import files_named
 from zoo_builder import Animal, animals
 
 from lab2_grader import lab, pipeline, report
@@ -111,6 +112,13 @@ def copied(small: Path, small_results: Path, tmp_path: Path) -> tuple[Path, Path
     shutil.copytree(small, tmp_path / "inbox")
     shutil.copytree(small_results, tmp_path / "results")
     return tmp_path / "inbox", tmp_path / "results"
+
+
+def test_what_the_page_of_formats_names(small_results: Path) -> None:
+    named = {name for name in files_named("A class") if not name.startswith("<name>")} - {run.FAULTS}
+    assert {path.name for path in small_results.iterdir() if path.is_file()} - {results.LOCK} == named
+    stamped = {path.name for path in (small_results / "ada").iterdir()}
+    assert {f"<name>/{name}" for name in stamped} & files_named("A class") == {f"<name>/{results.STAMP}"}
 
 
 def test_what_a_class_leaves(small_results: Path) -> None:

@@ -104,11 +104,11 @@ class Stamp(Record, frozen=True):
 
     Args:
         key: Digest of the submission's facts and package and of the grader's code.
-        student: As the entry has it.
-        keys: As the entry has them.
-        shown: As the entry has it.
-        note: As the entry has it.
-        flags: As the worker gave them.
+        student: Whose it is, for people.
+        keys: By what a gradebook knows the student.
+        shown: Where the submission came from.
+        note: What a person should know of how it was handed in; empty for nothing.
+        flags: What a person should look at: limits that the submission struck.
         attempts: How often it was graded until this result came of it.
     """
 
