@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
+import sys
 import types
 import typing
 from collections.abc import Iterator
@@ -37,10 +39,13 @@ LAYERS = (
     ("report",),
     ("provenance", "bag", "outlets"),
     ("pipeline",),
-    ("classroom", "gradebook", "doctor", "bag", "outlets"),
+    ("classroom", "doctor"),
     ("cli", "__main__"),
 )
 LEVEL = {name: level for level, layer in enumerate(LAYERS) for name in layer}
+# Imported and no dependency of every machine: ROS, colcon's setuptools, and the extras `bag` and `dask`.
+ELSEWHERE = {"rclpy", "std_msgs", "rosgraph_msgs", "launch", "launch_ros", "setuptools", "rosbags", "distributed"}
+NOT_IMPORTED = {"tomli"}  # msgspec's, on Python 3.10
 PURE = ("checks", "score", "report", "near", "reading", "stand_in", "records", "text")
 
 
@@ -82,6 +87,11 @@ def external_imports(tree: ast.Module) -> set[str]:
     return {module.split(".")[0] for module, _ in imported(tree)}
 
 
+def test_each_part_has_one_place_in_the_order() -> None:
+    named = [name for names in LAYERS for name in names]
+    assert sorted(named) == sorted({layer(name) for name in MODULES} - {"__init__", "build_proof"})
+
+
 @pytest.mark.parametrize("name", MODULES)
 def test_imports_go_up_only(name: str) -> None:
     if name in ("__init__.py", "ros/time_lapse_launch.py", "build_proof/setup.py"):
@@ -93,6 +103,24 @@ def test_imports_go_up_only(name: str) -> None:
             assert other == here or LEVEL[other] < LEVEL[here] or other in LAYERS[LEVEL[here]], (
                 f"{name} imports {other}"
             )
+
+
+def test_a_class_is_graded_from_the_top_down() -> None:
+    order = re.findall(r"`(\w+)`", (ast.get_docstring(MODULES["classroom/__init__.py"]) or "").split("before it:")[1])
+    inside = {Path(name).stem: tree for name, tree in MODULES.items() if layer(name) == "classroom"}
+    assert sorted(order) == sorted(inside.keys() - {"__init__"})
+    for name in order:
+        for module, imports in imported(inside[name]):
+            if module.startswith("lab2_grader.classroom"):
+                other = [*module.split("."), imports][2]
+                assert order.index(other) < order.index(name), f"{name} imports {other}"
+
+
+def test_what_is_imported_is_declared() -> None:
+    project = msgspec.toml.decode((PACKAGE.parent / "pyproject.toml").read_bytes())["project"]
+    declared = {re.match(r"[\w-]+", line)[0] for line in project["dependencies"]}
+    used = set().union(*map(external_imports, MODULES.values()))
+    assert used - sys.stdlib_module_names - ELSEWHERE - {"lab2_grader"} == declared - NOT_IMPORTED
 
 
 @pytest.mark.parametrize("name", [name for name in MODULES if layer(name) in PURE])

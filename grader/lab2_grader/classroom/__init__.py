@@ -2,8 +2,8 @@
 
     inbox → intake (here, several at once) → task as bytes → worker (here or elsewhere) → result as bytes → results/
 
-A module here imports only from those above it: `records`, `inbox` (with `minerva`, `moodle`, `roster`), `work`,
-`results`, `summary`, `pool`, `cluster`, `run`.
+A module here imports only from those named before it: `records`, `minerva`, `moodle`, `roster`, `inbox`, `work`, `results`,
+`summary`, `gradebook`, `pool`, `cluster`, `progress`, `run`, `remark`.
 """
 
 from __future__ import annotations
