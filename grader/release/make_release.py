@@ -3,7 +3,8 @@
     python grader/release/make_release.py students dist      what students and assistants get
     python grader/release/make_release.py solutions dist     the solution and the staff edition, from their date on
 
-Nothing of `solution/` is in the first. The second refuses before the date in the lab's facts.
+Nothing of `solution/` is in the first. The second refuses before the date in the lab's facts. What git does not track goes
+nowhere.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ import runpy
 import shutil
 import sys
 import tempfile
-import zipfile
 from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
@@ -27,30 +27,10 @@ from lab2_grader.errors import FaultError, Lab2Error, UsageError
 from lab2_grader.records import Limits, Request
 
 ROOT = Path(__file__).resolve().parents[2]
-LEFT_OUT = ("__pycache__", "build", "install", "log", "results")
 EPOCH = 315532800  # 1 January 1980 in seconds: the first moment that a zip can name
-MOMENT = (1980, 1, 1, 0, 0, 0)
-EXECUTABLE, PLAIN = 0o100755, 0o100644
+GRADESCOPE = "gradescope/make_zip.py"
+ZIP = runpy.run_path(str(ROOT / "grader" / GRADESCOPE))
 SECONDS = 300.0
-
-
-def package_files(folder: Path) -> Iterator[tuple[str, Path]]:
-    """(name, file) of a ROS package as it is handed out: everything but what a build or a run leaves behind."""
-    for path in sorted(folder.rglob("*")):
-        name = path.relative_to(folder)
-        if path.is_file() and not set(name.parts) & set(LEFT_OUT) and path.suffix != ".pyc":
-            yield name.as_posix(), path
-
-
-def make_zip(target: Path, folder: Path, top: str) -> None:
-    """Pack the package in *folder* below the folder *top* of a zip, with fixed times and modes."""
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, path in package_files(folder):
-            entry = zipfile.ZipInfo(f"{top}/{name}", MOMENT)
-            entry.external_attr = (EXECUTABLE if path.stat().st_mode & 0o100 else PLAIN) << 16
-            entry.create_system = 3
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(entry, path.read_bytes())
 
 
 def run(*argv: str, cwd: Path, **variables: str) -> str:
@@ -65,6 +45,40 @@ def run(*argv: str, cwd: Path, **variables: str) -> str:
         said = outcome.stderr.decode(errors="replace").strip()
         raise FaultError(f"{' '.join(argv[:3])} failed: {said}")
     return outcome.stdout.decode().strip()
+
+
+def tracked(folder: Path) -> Iterator[tuple[str, Path]]:
+    """(name, file) of what git tracks in *folder*, as it is now.
+
+    Raises:
+        FaultError: git cannot say.
+        UsageError: A file is tracked and not there.
+    """
+    for name in sorted(filter(None, run("git", "ls-files", "-z", cwd=folder).split("\0"))):
+        if not (folder / name).is_file():
+            raise UsageError(
+                f"{folder.name}/{name} is tracked by git and is not there. Restore it, or commit that it is gone."
+            )
+        yield name, folder / name
+
+
+def copy_tracked(folder: Path, into: Path) -> None:
+    """Copy what git tracks in *folder* to the folder *into*."""
+    for name, path in tracked(folder):
+        (into / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, into / name)
+
+
+def make_zip(target: Path, folder: Path, top: str) -> None:
+    """Pack the package in *folder* below the folder *top* of a zip, with fixed times and modes."""
+    modes = (ZIP["PLAIN"], ZIP["EXECUTABLE"])
+    ZIP["write"](
+        target,
+        (
+            (f"{top}/{name}", path.read_bytes(), modes[bool(path.stat().st_mode & 0o100)])
+            for name, path in tracked(folder)
+        ),
+    )
 
 
 def make_repository(target: Path, folder: Path) -> None:
@@ -85,9 +99,7 @@ def make_repository(target: Path, folder: Path) -> None:
     run("git", "init", "--quiet", "--bare", "--template=", "--initial-branch=main", str(target), cwd=ROOT)
     with tempfile.TemporaryDirectory() as name:
         tree = Path(name)
-        for inside, path in package_files(folder):
-            (tree / inside).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(path, tree / inside)
+        copy_tracked(folder, tree)
         index = {"GIT_WORK_TREE": str(tree), "GIT_INDEX_FILE": str(tree.with_suffix(".index"))}
         run("git", "add", "--all", "--force", cwd=tree, **identity, **index)
         root = run("git", "write-tree", cwd=tree, **identity, **index)
@@ -104,10 +116,12 @@ def make_students(out: Path) -> None:
     with tempfile.TemporaryDirectory() as name:
         build_worksheet(Path(name), Path(name) / "README.md")
         shutil.copyfile(Path(name) / "student.html", out / f"lab2-worksheet-{__version__}.html")
-    command = (sys.executable, "-m", "hatchling", "build", "--directory", str(out))
-    run(*command, cwd=ROOT / "grader", SOURCE_DATE_EPOCH=str(EPOCH))
-    gradescope = runpy.run_path(str(ROOT / "grader/gradescope/make_zip.py"))
-    gradescope["make"](out / f"lab2-gradescope-{__version__}.zip")
+    with tempfile.TemporaryDirectory() as name:
+        grader = Path(name)
+        copy_tracked(ROOT / "grader", grader)
+        command = (sys.executable, "-m", "hatchling", "build", "--directory", str(out))
+        run(*command, cwd=grader, SOURCE_DATE_EPOCH=str(EPOCH))
+        runpy.run_path(str(grader / GRADESCOPE))["make"](out / f"lab2-gradescope-{__version__}.zip")
 
 
 def make_solutions(out: Path, today: date) -> None:

@@ -49,8 +49,25 @@ def test_nothing_of_the_solution_is_in_it(archive: Path) -> None:
             assert not [line for line in telling if line in text], name
 
 
-def test_the_same_sources_make_the_same_bytes(archive: Path, tmp_path: Path) -> None:
-    subprocess.run([sys.executable, MAKE, tmp_path / "again.zip"], check=True)
+def test_the_whole_package_is_in_it(archive: Path) -> None:
+    listing = subprocess.run(
+        ["git", "ls-files", "-z", "lab2_grader"], cwd=ROOT / "grader", capture_output=True, check=True, text=True
+    )
+    tracked = {f"grader/{name}" for name in listing.stdout.split("\0") if name}
+    with zipfile.ZipFile(archive) as opened:
+        assert len(tracked) > 90 and tracked <= set(opened.namelist())
+
+
+def test_the_same_sources_make_the_same_bytes_whatever_else_lies_there(archive: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "grader"  # no checkout: there is no git here
+    for name in ("gradescope", "lab2_grader"):
+        shutil.copytree(ROOT / "grader" / name, copy / name)
+    for name in ("pyproject.toml", "README.md"):
+        shutil.copy(ROOT / "grader" / name, copy)
+    for name in (".env", "lab2_grader/id_rsa", "lab2_grader/facts/marks.csv", "lab2_grader/.cache/result.json"):
+        (copy / name).parent.mkdir(exist_ok=True)
+        (copy / name).write_text("nobody's business")
+    subprocess.run([sys.executable, copy / "gradescope" / "make_zip.py", tmp_path / "again.zip"], check=True)
     assert (tmp_path / "again.zip").read_bytes() == archive.read_bytes()
 
 

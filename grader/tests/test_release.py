@@ -37,10 +37,36 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_two_releases_are_the_same_bytes(students: Path, tmp_path: Path) -> None:
-    RELEASE["make_students"](tmp_path)
-    RELEASE["write_checksums"](tmp_path, "students")
-    assert contents(tmp_path) == contents(students)
+@pytest.fixture
+def elsewhere(tmp_path: Path) -> Path:
+    """The checkout at another place, and in it what git does not track."""
+    copy = tmp_path / "checkout"
+    RELEASE["copy_tracked"](ROOT, copy)
+    for command in (("init", "--quiet"), ("add", "--all", "--force")):
+        subprocess.run(["git", *command], cwd=copy, check=True)
+    for name in ("lab2_template/marks.csv", "lab2_template/lab2/draft.py", "lab2_template/build/lab2/setup.py"):
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        (copy / name).write_text("nobody's business")
+    for name in ("lab2_grader/draft.py", "lab2_grader/facts/answers.toml", "lab2_grader/notes.md"):
+        (copy / "grader" / name).write_text("nobody's business")
+    return copy
+
+
+def test_two_releases_are_the_same_bytes_whatever_else_lies_there(
+    students: Path, elsewhere: Path, tmp_path: Path
+) -> None:
+    subprocess.run(
+        [sys.executable, elsewhere / "grader/release/make_release.py", "students", tmp_path / "out"],
+        env={**os.environ, "PYTHONPATH": f"{elsewhere}/grader:{elsewhere}/worksheet"},
+        check=True,
+    )
+    assert contents(tmp_path / "out" / "students") == contents(students)
+
+
+def test_what_is_tracked_and_gone_stops_the_release(elsewhere: Path, tmp_path: Path) -> None:
+    (elsewhere / "lab2_template/setup.py").unlink()
+    with pytest.raises(UsageError, match="tracked"):
+        RELEASE["make_zip"](tmp_path / "lab2.zip", elsewhere / "lab2_template", "lab2")
 
 
 def test_the_checksums_hold(students: Path) -> None:
@@ -96,7 +122,7 @@ def test_the_repository_has_one_commit_and_the_template(students: Path, tmp_path
         ["git", "rev-list", "--count", "--all"], cwd=tmp_path / "clone", capture_output=True, text=True, check=True
     )
     assert count.stdout.strip() == "1"
-    handed_out = {name: path.read_bytes() for name, path in RELEASE["package_files"](ROOT / "lab2_template")}
+    handed_out = {name: path.read_bytes() for name, path in RELEASE["tracked"](ROOT / "lab2_template")}
     cloned = {name: data for name, data in contents(tmp_path / "clone").items() if not name.startswith(".git/")}
     assert cloned == handed_out
 
@@ -141,7 +167,7 @@ def test_solutions_come_out_on_their_date_and_not_before(tmp_path: Path) -> None
 
 def test_what_the_solution_did_not_change_is_as_handed_out() -> None:
     own = {"README.md", "setup.py", "lab2/numeric_talker.py", "lab2/numeric_listener.py", "launch/numeric_chatter.py"}
-    template = {name: path.read_bytes() for name, path in RELEASE["package_files"](ROOT / "lab2_template")}
-    solution = {name: path.read_bytes() for name, path in RELEASE["package_files"](ROOT / "solution")}
+    template = {name: path.read_bytes() for name, path in RELEASE["tracked"](ROOT / "lab2_template")}
+    solution = {name: path.read_bytes() for name, path in RELEASE["tracked"](ROOT / "solution")}
     assert {name for name in solution if solution[name] != template.get(name)} == own
     assert template.keys() <= solution.keys()
