@@ -26,7 +26,7 @@ def test_a_number_of_its_own_is_found(line: str) -> None:
     "line", ["", "55", "15", "5.5", "0.5", "1.5", "15.0", "0.05", "five", "50", "1,5.25", "5678901234567"]
 )
 def test_a_part_of_another_number_is_not(line: str) -> None:
-    assert 5 not in numbers_in(line) or line == "1,5.25"
+    assert 5 not in numbers_in(line)
 
 
 @pytest.mark.parametrize("line", ["-87", "I heard: -87", "data=-87)", "number-87", "[-87]", "-87.0", "'-87'"])
