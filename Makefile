@@ -143,4 +143,4 @@ lock: setup-dev ## pin the dependencies anew: every *.in to its *.txt, with hash
 			$(REQUIREMENTS)/$$name.in -o $(REQUIREMENTS)/$$name.txt; done
 
 clean: ## remove what the commands made, but no results
-	@rm -rf $(VENV) build dist .pytest_cache .ruff_cache .mypy_cache grader/.mypy_cache
+	@rm -rf $(VENV) build dist $(foreach folder,. grader worksheet,$(addprefix $(folder)/,.pytest_cache .ruff_cache .mypy_cache))
