@@ -1,10 +1,12 @@
-"""What all tests share: the repository's folders, and one grade of the solution that many tests look at."""
+"""What tests share: the repository's folders, one grade of the solution that many tests look at, and a browser."""
 
 from __future__ import annotations
 
 import shutil
 import signal
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,6 +17,15 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # Tests that interrupt a grader do so also where they run in the background of a script, which ignores SIGINT.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
+CHROMIUM_FLAGS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-sync",
+)
 
 # What the samples change in the solution: (file, what stands there, what takes its place).
 SAMPLES = {
@@ -57,3 +68,16 @@ def samples(
             1
         ]
     return folders
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """The installed Chromium."""
+    program = next(filter(None, map(shutil.which, CHROMIUM)), None)
+    if program is None:
+        pytest.skip("no Chromium is installed (apt-get install chromium)")
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    with sync_api.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=program, args=list(CHROMIUM_FLAGS))
+        yield opened
+        opened.close()

@@ -93,12 +93,10 @@ def talker_start(view: View, earlier: Earlier) -> Verdict:
 def talker_step(view: View, earlier: Earlier) -> Verdict:
     """Each number is one more than the last."""
     check = "talker-step"
-    if stop := _unheard(check, view, earlier):
+    if stop := _uncounted(check, view, earlier):
         return stop
     sequel, scene = view.sequel, view.talking
-    assert scene is not None
-    if sequel is None or not sequel.values:
-        return blocked(check, "talker-start")
+    assert sequel is not None and scene is not None
     if len(sequel.values) == 1 and scene.ended_by_itself(view.talker_name):
         file, line = scene.place_of_error(view.talker_name, view.specification.package)
         error = scene.error_of(view.talker_name)
@@ -124,12 +122,10 @@ def talker_step(view: View, earlier: Earlier) -> Verdict:
 def talker_wrap(view: View, earlier: Earlier) -> Verdict:
     """At 127 the count goes back to 0, and it never leaves 0 to 127."""
     check = "talker-wrap"
-    if stop := _unheard(check, view, earlier):
+    if stop := _uncounted(check, view, earlier):
         return stop
     sequel, scene = view.sequel, view.talking
-    assert scene is not None
-    if sequel is None or not sequel.values:
-        return blocked(check, "talker-start")
+    assert sequel is not None and scene is not None
     topic = view.specification.number_topic
     rise = sequel.common_rise
     if rise < 1:
@@ -212,6 +208,13 @@ def talker_chatter(view: View, earlier: Earlier) -> Verdict:
     if near := next((endpoint.topic for endpoint in view.published if endpoint.type == topic.type), ""):
         return failed(check, "near-topic", near=near)
     return failed(check, "removed")
+
+
+def _uncounted(check: str, view: View, earlier: Earlier) -> Verdict | None:
+    """Why nothing can be said of how the count goes on; None when whole numbers were heard."""
+    if stop := _unheard(check, view, earlier):
+        return stop
+    return None if view.sequel is not None and view.sequel.values else blocked(check, "talker-start")
 
 
 def _unheard(check: str, view: View, earlier: Earlier) -> Verdict | None:
