@@ -27,6 +27,7 @@ from lab2_grader.records import (
     Endpoint,
     Limits,
     Message,
+    ProcessGone,
     ProcessSeen,
     Request,
     Scene,
@@ -239,12 +240,21 @@ class Stage:
             scenes = (self._launched(SceneName.CONVERSATION, build, installed, numeric, started),)
             if _shows_talker(scenes[0], launched(numeric.talker, build)):
                 return scenes
-        follow = ("-p", "use_sim_time:=true") if self._clock is Clock.TIME_LAPSE else ()
-        single = self._single(numeric.talker, build, installed, follow)
+        talker: Scene | None = None
+        if self._clock is Clock.TIME_LAPSE:
+            talker = self._talker(build, installed, started, Clock.TIME_LAPSE)
+        if talker is None or _died_silent(talker):  # over the arguments that the clock takes, perhaps
+            talker = self._talker(build, installed, started, Clock.REAL_TIME)
+        return (*scenes, talker) if talker is not None else scenes
+
+    def _talker(self, build: Build, installed: Path, started: threading.Event, clock: Clock) -> Scene | None:
+        """The talker by itself; None when there is nothing to start."""
+        follow = ("-p", "use_sim_time:=true") if clock is Clock.TIME_LAPSE else ()
+        single = self._single(lab.specification().numeric.talker, build, installed, follow)
         if single is None:
-            return scenes
+            return None
         how, label, request = single
-        return (*scenes, self._play(ScenePlan(SceneName.TALKER, self._clock, request, label), how, started))
+        return self._play(ScenePlan(SceneName.TALKER, clock, request, label), how, started)
 
     def _launched(
         self, name: SceneName, build: Build, installed: Path, pair: lab.Pair, started: threading.Event
@@ -336,6 +346,12 @@ def _launch_path(build: Build, name: str) -> str:
     launch itself then says that it is ambiguous.
     """
     return next((path for path in build.launch_files if path.rsplit("/", 1)[-1] == name), "")
+
+
+def _died_silent(scene: Scene) -> bool:
+    """Whether the program of *scene* ended by itself before it had published anything."""
+    ended = any(isinstance(event, ProcessGone) and event.by is EndedBy.ITSELF for event in scene.events)
+    return ended and not any(isinstance(event, Message) for event in scene.events)
 
 
 def _shows_talker(scene: Scene, talker: str) -> bool:

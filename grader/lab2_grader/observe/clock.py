@@ -9,6 +9,7 @@ same sequence; only the time they take differs.
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections.abc import Callable
 
@@ -26,6 +27,8 @@ HOLD_SECONDS = 0.1  # how long the clock stands still, at least, to see whether 
 UNASKED_LIMIT = 5  # so many messages while the clock stands still: the node has a clock of its own
 TARDY_STEPS = 3  # a message that took more steps than this was not asked for by them
 TARDY_LIMIT = 5
+NOT_YET = 0.8  # of a period after a message, none is due
+MESSAGES_A_TICK = 20  # at most
 REAL_TIME_HERTZ = 20
 HELD_SECONDS = 5.0  # a held node is let go before the middleware takes it for dead
 
@@ -53,6 +56,7 @@ class LockStep:
         self._now = 0.0
         self._period = 0.0
         self._tardy = 0
+        self._measured_anew = False
         self._advanced_at = 0.0
         self._ahead = 0.0  # of the last tick, in ROS time
         self._listener = listener
@@ -130,8 +134,20 @@ class LockStep:
         if self._follows:
             self._tardy = self._tardy + 1 if steps > TARDY_STEPS else 0
             if self._tardy >= TARDY_LIMIT:
-                self._begin_real_time()
+                return self._measure_anew()
         return True
+
+    def _measure_anew(self) -> bool:
+        """The numbers do not come as was measured: perhaps it was of other messages. The second time it is another clock's.
+
+        False when the talker falls silent, or ends, over that.
+        """
+        self._tardy = 0
+        found = self._measured_anew or self._find_period()
+        if found and (self._measured_anew or not self._follows):
+            self._begin_real_time()
+        self._measured_anew = True
+        return found
 
     def _can_tick(self) -> bool:
         """Whether there is still somebody who could tick."""
@@ -173,6 +189,7 @@ class LockStep:
 
         False when the talker falls silent, or ends, before that.
         """
+        self._ahead = 0.0
         self._jump()
         shortest, longest = PROBE_WAIT_SECONDS
         answer = longest  # how soon the talker answers, at its best
@@ -198,9 +215,17 @@ class LockStep:
         # longer, never shorter. A step that is too long would let a timer fire twice, one that is too short only not at all.
         self._period = round(min(intervals[1:]) * PROBE_SECONDS, 6)
         self._follows = self._stands_still(max(HOLD_SECONDS, 1.5 * took))
+        if self._follows and self._period != lab.specification().text_topic.period_seconds:
+            self._shorten()
         self._record("follows_ros_clock", float(self._follows))
         self._record("period_seconds", self._period if self._follows else round(took, 2))
         return True
+
+    def _settle(self, seconds: float) -> None:
+        """Let what belongs to the same tick come."""
+        for _ in range(MESSAGES_A_TICK):
+            if not self._wait(len(self._heard()), seconds):
+                return
 
     def _jump(self) -> None:
         """Move the clock far enough for any timer, and wait for the first message.
@@ -215,6 +240,23 @@ class LockStep:
     def _stands_still(self, seconds: float) -> bool:
         """Whether nothing comes for *seconds* while the clock does not move; a few late messages are let pass."""
         return any(not self._wait(len(self._heard()), seconds) for _ in range(UNASKED_LIMIT))
+
+    def _shorten(self) -> None:
+        """Shorten the period for as long as messages come before it is over; late answers can have made it look longer.
+
+        One may come early because the one before came late, so it takes two in a row.
+        """
+        early = 0
+        while self._period > PROBE_SECONDS and not self._ahead:
+            before, self._ahead = len(self._heard()), round(NOT_YET * self._period, 6)
+            self._advance(self._ahead)
+            if self._wait(before, HOLD_SECONDS):
+                early, self._ahead = early + 1, 0.0
+                self._settle(STEP_WAIT_SECONDS)
+            if early == 2:
+                probes = round(self._period / PROBE_SECONDS)
+                self._period = round(min(math.ceil(NOT_YET * probes), probes - 1) * PROBE_SECONDS, 6)
+                early = 0
 
     def _begin_real_time(self) -> None:
         self._phase("real-time")

@@ -97,7 +97,8 @@ class _Ear:
         def over() -> bool:
             idle = min(self._observer.quiet_seconds, time.monotonic() - began)
             deaf = seconds is None and self._misses >= PATIENCE
-            return heard() or not self._observer.alive() or (deaf and idle > BRIEF_SECONDS)
+            gone = self._source in self._observer.ended_executables - self._observer.executables()
+            return heard() or ((deaf or gone) and idle > BRIEF_SECONDS) or not self._observer.alive()
 
         if not self._observer.until(heard, min(patience, PARTIAL_LINE_SECONDS)):
             self._observer.finish_lines()
