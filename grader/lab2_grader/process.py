@@ -24,7 +24,9 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
+from typing import TypeVar
 
 from lab2_grader import cgroup, lab
 from lab2_grader.errors import FaultError
@@ -50,6 +52,8 @@ CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 # below that (an observer's) its processes.
 MARK = "LAB2_GRADER_RUN"
 
+Item = TypeVar("Item")
+Made = TypeVar("Made")
 OnOutput = Callable[[str, bytes], None]
 
 _counter = itertools.count()
@@ -594,6 +598,19 @@ class Process:
             return False
         mark = f"{MARK}={self._name}".encode()
         return any(variable == mark or variable.startswith(mark + b"-") for variable in variables)
+
+
+def spread(function: Callable[[Item], Made], items: Iterable[Item], workers: int, at_a_time: int) -> Iterator[Made]:
+    """What the pure *function* makes of each of *items*, in their order, reckoned by so many copies of this process.
+
+    Args:
+        function: Of a module, or a partial of one.
+        items: Its arguments.
+        workers: How many processes.
+        at_a_time: How many items a process is handed at once.
+    """
+    with ProcessPoolExecutor(workers) as pool:
+        yield from pool.map(function, items, chunksize=at_a_time)
 
 
 def run(request: Request, on_output: OnOutput | None = None) -> Outcome:

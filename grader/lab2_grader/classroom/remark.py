@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from lab2_grader import pipeline
+from lab2_grader import pipeline, process
 from lab2_grader.classroom import results, summary
 from lab2_grader.classroom.pool import cores
 from lab2_grader.errors import Lab2Error, UsageError
@@ -57,10 +56,10 @@ def rescore(root: Path, rubric: Rubric) -> Remarked:
 
 
 def _rescore(folders: list[Path], rubric: Rubric) -> Remarked:
+    judged = partial(_judged, rubric=rubric)
     if len(folders) < WORTH_A_POOL:
-        return _written(map(partial(_judged, rubric=rubric), folders))
-    with ProcessPoolExecutor(cores()) as pool:
-        return _written(pool.map(partial(_judged, rubric=rubric), folders, chunksize=AT_A_TIME))
+        return _written(map(judged, folders))
+    return _written(process.spread(judged, folders, cores(), AT_A_TIME))
 
 
 def _judged(folder: Path, rubric: Rubric) -> tuple[Path, Result | None, Change | None, str]:
