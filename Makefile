@@ -23,7 +23,7 @@ RUBRIC ?=
 ISOLATION ?= auto
 SOURCED := $(if $(and $(ROS_DISTRO),$(shell command -v ros2 2>/dev/null)),yes,)
 
-.PHONY: help setup setup-dev isolation browser grade grade-all rescore doctor worksheet gradescope release \
+.PHONY: help setup setup-dev isolation browser grade grade-all rescore gradebook doctor worksheet gradescope release \
 	release-solutions test test-one test-slow lint format bench stress record formats clean lock
 
 help: ## list the commands
@@ -83,6 +83,10 @@ grade-all: setup ## grade a class: INBOX=folder|zip|csv [OUT=results] [JOBS=n] [
 
 rescore: setup ## judge recorded evidence again, without ROS: RESULTS=folder [RUBRIC=file]
 	@$(GRADER) rescore "$(RESULTS)" $(if $(RUBRIC),--rubric "$(RUBRIC)")
+
+gradebook: setup ## fill a class's marks into what Minerva or Moodle gave out: BOOK=file OUT=file [RESULTS=results] [COLUMN=…] [FEEDBACK=yes]
+	@$(GRADER) gradebook fill --results "$(or $(RESULTS),results)" --in "$(BOOK)" --out "$(OUT)" \
+		$(if $(COLUMN),--column "$(COLUMN)") $(if $(FEEDBACK),--feedback)
 
 doctor: setup ## say what this machine has and how to mend what is missing
 	@$(GRADER) doctor

@@ -2,7 +2,7 @@
 
 Usage: python class_generator.py FOLDER [--count 100] [--seed 1] [--kind directories|minerva|repositories]
 
-FOLDER/inbox (or inbox.zip, or inbox.csv) is what `lab2-grader grade-all` takes, and FOLDER/expected.json names the animal of
+What it prints, a folder, a zip or a table below FOLDER, is what `lab2-grader grade-all` takes, and FOLDER/expected.json names the animal of
 each student. The same arguments make the same class.
 """
 
