@@ -18,8 +18,9 @@ PROCESS_LABEL = re.compile(r"^\[([^\[\]\n]{1,120})-(\d{1,4})\] ?(.*)$", re.DOTAL
 PROCESS_STARTED = re.compile(r"^\[INFO\] \[([^\[\]\n]{1,120})-(\d{1,4})\]: process started with pid \[(\d+)\]$")
 PROCESS_DIED = re.compile(r"^\[ERROR\] \[([^\[\]\n]{1,120})-(\d{1,4})\]: process has died ")
 
-# A whole number that is no part of a longer number or of a decimal fraction (5.0 is 5). It may touch a word (number5).
-NUMBER = re.compile(r"(?<![\d.])([+-]?\d{1,12})(?:\.0+)?(?!\d|\.\d)")
+# A whole number that is no part of a longer number or of a decimal fraction (5.0 is 5). It may touch a word (number5) or
+# a dot that belongs to words (No.5, heard...5).
+NUMBER = re.compile(r"(?<!\d)(?<!\d\.)([+-]?\d{1,12})(?:\.0+)?(?!\d|\.\d)")
 SIGNED_AFTER_WORD = re.compile(r"(?<=\w)[-+](\d{1,12})(?:\.0+)?(?!\d|\.\d)")
 
 
