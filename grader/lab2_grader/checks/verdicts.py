@@ -26,7 +26,7 @@ def known(check: str) -> dict[str, messages.Value]:
         "text_topic": texts.name,
         "talker": pair.talker,
         "listener": pair.listener,
-        "file": pair.launch_file,
+        "launch_file": pair.launch_file,
         "topic": topic.name,
         "name": topic.name.lstrip("/"),
         "type": topic.type,
