@@ -16,6 +16,13 @@ DATA = HERE / "data" / "evidence"
 RECORDED = (
     *("solution", "never-wraps", "publisher-overwritten", "listener-counts-for-itself", "no-entry-points"),
     *("launch-old-pair", "sleep-loop-fast", "setup-syntax-error"),
+    *(
+        "number-right-after-a-dot",
+        "talker-callback-without-self",
+        "talker-dies-in-its-callback",
+        "talker-data-is-a-float",
+    ),
+    *("talker-without-super", "listener-without-super", "talker-dies-after-the-first"),
 )
 
 

@@ -142,4 +142,7 @@ ROBOTS = (
     "File too large",
     "has no setter",
     "object cannot be interpreted as an integer",
+    "object has no attribute '(_[a-z]\\w*)'",
+    "takes 0 positional arguments but 1 was given",
+    "'NoneType' object is not callable",
 )

@@ -112,7 +112,13 @@ FLOODED = {
     ("launch-conversation", "flood"): SceneName.CONVERSATION,
     ("listener-numeric", "flood"): SceneName.LISTENER,
 }
-BY_HAND = (*BUILDS, *FLOODED, ("launch-conversation", "strangers"), ("originals-kept", "strangers"))
+BY_HAND = (
+    *BUILDS,
+    *FLOODED,
+    ("talker-step", "called"),
+    ("launch-conversation", "strangers"),
+    ("originals-kept", "strangers"),
+)
 
 
 @pytest.mark.parametrize(("check", "key"), BUILDS)
@@ -154,6 +160,34 @@ def test_a_number_that_a_busy_machine_may_have_lost_costs_nothing(
 
     found = verdicts(with_events(recorded(name, folder), SceneName.CONVERSATION, without_twelve))["launch-conversation"]
     assert (found.status, found.message) == expected
+
+
+@pytest.mark.parametrize("heard", [True, False])
+def test_a_callback_that_was_called_too_soon_is_named_whether_its_number_was_heard_or_not(
+    heard: bool, folder: Path
+) -> None:
+    """create_timer(…, self.timer_callback()) publishes while the node is made, perhaps before anybody can hear it."""
+
+    def called(event: Event) -> Event | None:
+        if isinstance(event, Line) and event.text.startswith("AttributeError"):
+            return msgspec.structs.replace(event, text="TypeError: 'NoneType' object is not callable")
+        return None if isinstance(event, Message) and not heard else event
+
+    observed = with_events(recorded("talker-dies-after-the-first", folder), SceneName.CONVERSATION, called)
+    together = observed.scene(SceneName.CONVERSATION)
+    assert together is not None
+    if not heard:  # then the talker is played alone, too
+        alone = msgspec.structs.replace(
+            together, name=SceneName.TALKER, started_with="executable", label="numeric_talker"
+        )
+        observed = msgspec.structs.replace(observed, scenes=(*observed.scenes, alone))
+    found = verdicts(observed)
+    assert (found["talker-step"].status, found["talker-step"].message) == (Status.FAIL, "called")
+    assert found["talker-type"].status is Status.PASS
+    assert found["talker-start"].status is (Status.PASS if heard else Status.BLOCKED)
+    assert found["talker-wrap"].because == ("talker-step",)
+    if not heard:
+        assert found["talker-start"].because == found["launch-conversation"].because == ("talker-step",)
 
 
 @pytest.mark.parametrize(("check", "key"), FLOODED)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from lab2_grader import lab
 from lab2_grader.checks import source
+from lab2_grader.checks.talker import NO_NUMBERS
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
 from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
@@ -24,6 +25,7 @@ COMMON_ERRORS = {
     "generate_launch_description": "no-function",
     "'NoneType' object has no attribute 'get_launch_arguments": "no-return",
 }
+ONLY_ONE = ("died", "called", "once")  # faults of talker-step after a single number
 NEARBY, NEARBY_PER_MESSAGE = 100, 2  # lines that can belong to a message: so many, and so many for each before it
 NOT_WHAT_IT_RECEIVES = ("silent", "constant", "others", "noise", "no-f-string")  # a listener whose lines answer nothing
 QUEUE_FULL = 8  # numbers that wait for a listener whose queue holds ten, as in the worksheet: others may be lost by now
@@ -110,8 +112,12 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
         return blocked(check, *starts.because)
     if scene is None or starts.status is not Status.PASS:
         return blocked(check, "launch-starts")
-    if earlier["talker-type"].message == "wrong-data":
-        return blocked(check, "talker-type")  # whatever number went out, nobody meant it
+    if earlier["talker-step"].message in ONLY_ONE:
+        return blocked(
+            check, "talker-step"
+        )  # whether the pair had found each other by then is luck, and must not count
+    if earlier["talker-start"].message == "wrong-data":
+        return blocked(check, "talker-start")  # whatever number went out, nobody meant it
     spoken = _spoken(view, scene)
     printed = _printed(view, scene, spoken)
     answered = [message for message in spoken if message.data in printed]
@@ -128,7 +134,7 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
         others = names("another process" if program == "-" else program for program in speakers)
         return failed(check, "strangers", others=others)
     for cause in ("talker-type", "talker-start", "listener-numeric"):
-        silent_start = cause != "talker-start" or earlier[cause].message in ("silent", "not-numbers")
+        silent_start = cause != "talker-start" or earlier[cause].message in (*NO_NUMBERS, "not-numbers")
         if earlier[cause].status is not Status.PASS and silent_start:
             return blocked(check, *(earlier[cause].because or (cause,)))
     if not spoken:

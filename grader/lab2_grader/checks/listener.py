@@ -43,7 +43,9 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
         if death == AT_START and scene.ended is not None and scene.ended.code == 0:
             return failed(check, "ended")
         if death == AT_START:
-            return failed(check, "died", file, line, error=scene.error_of(scene.scene.label))
+            error = scene.error_of(scene.scene.label)
+            key = "no-super" if source.is_of_rclpy(view, scene.scene.label, error) else "died"
+            return failed(check, key, file, line, error=error)
         return blocked(check, "listener-chatter")
     if wrong := _unsuitable(check, topic.name, topic.type, view, scene):
         return wrong

@@ -10,6 +10,7 @@ from lab2_grader.checks.view import View
 
 Place = tuple[str, int]  # file within the package, line from 1
 NOWHERE: Place = ("", 0)
+PRIVATE = re.compile(r"object has no attribute '(_[a-z]\w*)'")
 ENTRY_POINT = re.compile(r"[\w-]+\s*=\s*[\w.]+:")  # name = package.module:function
 
 
@@ -64,6 +65,23 @@ def early_increment(view: View) -> Place:
         elif _is_call_of(node, "publish") and increments:
             return path, increments[0]
     return NOWHERE
+
+
+def called_callback(view: View) -> Place:
+    """Where create_timer is given the result of a call instead of a method; NOWHERE when it is not."""
+    path, tree = _talker(view)
+    for node in _walk(tree):
+        if isinstance(node, ast.Call) and _is_call_of(node, "create_timer"):
+            given = [*node.args[1:2], *(keyword.value for keyword in node.keywords if keyword.arg == "callback")]
+            if any(isinstance(value, ast.Call) for value in given):
+                return path, node.lineno
+    return NOWHERE
+
+
+def is_of_rclpy(view: View, program: str, error: str) -> bool:
+    """Whether *error* misses a private attribute that *program* does not name: one that rclpy's Node sets when it is made."""
+    missed = PRIVATE.search(error)
+    return missed is not None and missed[1] not in view.source(file_of(view, program))
 
 
 def written(view: View, program: str, text: str) -> Place:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from lab2_grader.checks import source
 from lab2_grader.checks.sequence import Sequel, Step, around
@@ -15,6 +16,17 @@ Earlier = Mapping[str, Verdict]
 
 # What Python says when it cannot make the data an int: with the assertions of the message compiled in, and without.
 NOT_AN_INT = ("PyLong_Check(field)", "object cannot be interpreted as an integer")
+# What Python or rclpy says when the talker dies, and which fault that is.
+DEATHS = {
+    "Expected <class": "wrong-message",
+    "has no setter": "no-setter",
+    "incompatible type": "two-types",  # one process cannot know one topic under two types
+    "takes 0 positional arguments but 1 was given": "no-self",
+}
+# Faults of talker-start that leave nothing to count.
+NO_NUMBERS = ("silent", "died", "wrong-message", "wrong-data", "no-self")
+AT_CREATION = ("ended", "no-setter", "no-super", "two-types")
+NOT_CALLABLE = "'NoneType' object is not callable"
 SILENT_SECONDS = 3.0  # no message for so long before the scene was stopped: it had stopped by itself
 
 
@@ -28,26 +40,11 @@ def talker_type(view: View, earlier: Earlier) -> Verdict:
         return inconclusive(check, "inconclusive-scene", fault=scene.scene.fault)
     topic = view.specification.number_topic
     publishers = view.number_publishers
-    died = scene.ended_by_itself(view.talker_name)
-    error = scene.error_of(view.talker_name)
-    if died and not view.numbers and scene.scene.name is SceneName.CONVERSATION:
+    if scene.ended_by_itself(view.talker_name) and not view.numbers and scene.scene.name is SceneName.CONVERSATION:
         return blocked(check, "entry-points")  # there was nothing else that could be run in its place
-    if died and len(view.numbers) <= 1 and scene.says(view.talker_name, *NOT_AN_INT):
-        # What cannot be made an Int8 aborts the process, or is published as a number that nobody meant.
-        file, line = scene.place_of_error(view.talker_name, view.specification.package)
-        return failed(check, "wrong-data", file, line, error=error, talker=view.talker_name)
-    if died and not view.numbers:
-        if scene.ended is not None and scene.ended.code == 0 and scene.scene.label:
-            return failed(check, "ended", talker=view.talker_name)
-        key = "died"
-        if publishers and "TypeError" in error:
-            key = "wrong-message"
-        elif "has no setter" in error:
-            key = "no-setter"
-        elif "incompatible type" in error:  # one process cannot know one topic under two types
-            key = "two-types"
-        file, line = scene.place_of_error(view.talker_name, view.specification.package)
-        return failed(check, key, file, line, error=error, found=error, talker=view.talker_name)
+    if (death := _death(view)) and not _shows_publishers(view):
+        key = death.key if death.key in AT_CREATION else "died"
+        return failed(check, key, death.file, death.line, error=death.error, found=death.error, talker=view.talker_name)
     if not publishers:
         return _elsewhere(view)
     types = {endpoint.type for endpoint in publishers}
@@ -59,6 +56,55 @@ def talker_type(view: View, earlier: Earlier) -> Verdict:
     if all(endpoint.reliability == "best-effort" for endpoint in publishers):
         return failed(check, "best-effort")
     return passed(check)
+
+
+class _Death(NamedTuple):
+    """How the talker ended before it published a number that anybody meant."""
+
+    key: str
+    error: str
+    file: str
+    line: int
+
+
+def _death(view: View) -> _Death | None:
+    """How the talker ended before its first number; None when it did not."""
+    scene, name = view.talking, view.talker_name
+    if scene is None or not scene.ended_by_itself(name):
+        return None
+    aborted = scene.says(name, *NOT_AN_INT) and len(view.numbers) <= 1
+    if view.numbers and not aborted:  # what cannot be made an Int8 may be published as a number that nobody meant
+        return None
+    error = scene.error_of(name)
+    if scene.ended is not None and scene.ended.code == 0 and scene.scene.label:
+        key = "ended"
+    elif aborted:
+        key = "wrong-data"
+    elif source.is_of_rclpy(view, name, error):
+        key = "no-super"
+    else:
+        key = next((key for text, key in DEATHS.items() if text in error), "died")
+    return _Death(key, error, *scene.place_of_error(name, view.specification.package))
+
+
+def _shows_publishers(view: View) -> bool:
+    """Whether a talker that died had been in the graph for sure, and so shows what it meant to publish.
+
+    One that dies in `__init__` may be seen there for a moment, or not: that must not decide.
+    """
+    scene, death = view.talking, _death(view)
+    if scene is None or death is None or death.key in AT_CREATION:
+        return False
+    published = death.key in ("wrong-data", "wrong-message") or scene.died_in_spin(view.talker_name)
+    return published and bool(view.published)
+
+
+def _called_too_soon(view: View) -> bool:
+    """Whether the timer was given None, for the callback was called in its place: once, perhaps before anybody could hear it."""
+    scene, name = view.talking, view.talker_name
+    if scene is None or not scene.ended_by_itself(name) or len(view.numbers) > 1:
+        return False
+    return scene.died_in_spin(name) and NOT_CALLABLE in scene.error_of(name)
 
 
 def _elsewhere(view: View) -> Verdict:
@@ -74,6 +120,10 @@ def _elsewhere(view: View) -> Verdict:
 def talker_start(view: View, earlier: Earlier) -> Verdict:
     """The count begins at 0."""
     check = "talker-start"
+    if not view.numbers and _called_too_soon(view):
+        return blocked(check, "talker-step")
+    if death := _death(view) if _shows_publishers(view) and _has_numbers(view) else None:
+        return failed(check, death.key, death.file, death.line, error=death.error, talker=view.talker_name)
     if stop := _unheard(check, view, earlier):
         return stop
     sequel = view.sequel
@@ -93,6 +143,9 @@ def talker_start(view: View, earlier: Earlier) -> Verdict:
 def talker_step(view: View, earlier: Earlier) -> Verdict:
     """Each number is one more than the last."""
     check = "talker-step"
+    if _called_too_soon(view):
+        error = view.talking.error_of(view.talker_name) if view.talking else ""
+        return failed(check, "called", *source.called_callback(view), error=error, talker=view.talker_name)
     if stop := _uncounted(check, view, earlier):
         return stop
     sequel, scene = view.sequel, view.talking
@@ -194,9 +247,9 @@ def talker_chatter(view: View, earlier: Earlier) -> Verdict:
         return passed(check)
     if earlier["talker-type"].status is Status.BLOCKED:
         return blocked(check, *earlier["talker-type"].because)
-    if earlier["talker-type"].message in ("died", "ended", "wrong-message", "no-setter", "two-types"):
+    if _death(view) and not _shows_publishers(view):
         return blocked(check, "talker-type")
-    if publishers and earlier["talker-start"].message == "silent":
+    if publishers and earlier["talker-start"].message in NO_NUMBERS:
         return blocked(check, "talker-start")
     if publishers:
         if overwritten := source.overwritten_publisher(view):
@@ -217,15 +270,22 @@ def _uncounted(check: str, view: View, earlier: Earlier) -> Verdict | None:
     return None if view.sequel is not None and view.sequel.values else blocked(check, "talker-start")
 
 
+def _has_numbers(view: View) -> bool:
+    """Whether the talker has a publisher for numbers, there or elsewhere."""
+    return bool(view.number_publishers or view.stray_number_topic)
+
+
 def _unheard(check: str, view: View, earlier: Earlier) -> Verdict | None:
     """Why nothing can be said of the count; None when numbers were heard."""
-    base = earlier["talker-type"]
+    base, start = earlier["talker-type"], earlier.get("talker-start")
     if base.status is Status.INCONCLUSIVE:
         return inconclusive(check, "inconclusive-scene", fault=view.talking.scene.fault if view.talking else "")
-    if view.numbers and base.message != "wrong-data":
+    if start is not None and start.message in NO_NUMBERS:
+        return blocked(check, "talker-start")
+    if start is not None and start.because == ("talker-step",) and not view.numbers:
+        return blocked(check, "talker-step")
+    if view.numbers:
         return None
     if base.status in (Status.FAIL, Status.BLOCKED):
         return blocked(check, *(base.because or ("talker-type",)))
-    if check == "talker-start":
-        return failed(check, "silent")
-    return blocked(check, "talker-start")
+    return failed(check, "silent")

@@ -31,6 +31,11 @@ from lab2_grader.records import (
 from lab2_grader.stand_in import launched
 
 TRACEBACK = "Traceback (most recent call last):"
+# Where C++ code passes on what Python had raised before, by a name and an address that say nothing.
+PASSED_ON = "SystemError: <built-in method"
+ADDRESS = re.compile(r" at 0x[0-9a-f]+")
+ERROR = re.compile(r"[A-Z]\w*(?:Error|Exception): ")
+IN_SPIN = re.compile(r'File "[^"]*/rclpy/[^"]*", line \d+, in spin')
 
 
 class SceneView:
@@ -134,12 +139,18 @@ class SceneView:
         if starts:
             body = texts[starts[-1] + 1 :]
             closing = next((text for text in body if text and not text.startswith((" ", "\t", "["))), "")
+            if closing.startswith(PASSED_ON):
+                closing = next((text for text in reversed(texts[: starts[-1]]) if ERROR.match(text)), closing)
             if closing:
-                return closing
+                return ADDRESS.sub("", closing)
         limit = self.ended.limit if self.ended is not None else ""
         if limit:
             return messages.phrase("limit", limit=limit)
         return next((reading.said(text) for text in reversed(texts) if text.strip()), messages.phrase("no-error"))
+
+    def died_in_spin(self, source: str) -> bool:
+        """Whether the traceback of *source* goes through rclpy's spin: its node was complete, and known to the graph."""
+        return any(IN_SPIN.search(line.text) for line in self.lines if line.source == source)
 
     def place_of_error(self, source: str, package: str) -> tuple[str, int]:
         """(file within the package, line) that the last traceback of *source* names last; ("", 0) when it names none."""
