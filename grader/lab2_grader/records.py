@@ -127,6 +127,7 @@ class GitFacts(Record, frozen=True):
         products: Committed build products and caches, at most 20.
         products_count: How many there are in all.
         committed: When that commit was made, ISO 8601 with its time zone; empty when unknown.
+        submodule: The folder of the package, or one around it, that HEAD holds only as a link to another repository; else empty.
     """
 
     commit: str | None
@@ -137,6 +138,7 @@ class GitFacts(Record, frozen=True):
     products: tuple[str, ...]
     products_count: int
     committed: str = ""
+    submodule: str = ""
 
 
 class SubmissionFacts(Record, frozen=True):

@@ -53,7 +53,9 @@ def score(evidence: Evidence, verdicts: Sequence[Verdict], rubric: Rubric, evide
     # One cause withholds many checks: it is said once, with the first of them.
     first = {check.observed: check.id for check in reversed(inconclusive)}
     reasons = tuple(f"{first[why]} {why}" for why in reversed(first))
-    withheld = (messages.status("withheld", why="; ".join(reasons[:3])),) if reasons else ()
+    sourced = {check.message for check in inconclusive} == {"inconclusive-unsupported"}
+    what_next = messages.phrase("grade-sourced" if sourced else "grade-again")
+    withheld = (messages.status("withheld", why="; ".join(reasons[:3]), next=what_next),) if reasons else ()
     facts = evidence.submission
     return Result(
         schema=RESULT_SCHEMA,

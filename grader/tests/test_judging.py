@@ -95,7 +95,11 @@ def test_every_lost_point_has_words(folder: Path) -> None:
             if verdict.status not in (Status.PASS, Status.NOT_ASSESSED):
                 assert verdict.observed
                 assert verdict.hint or verdict.status is not Status.FAIL
-                assert "{" not in verdict.observed + verdict.hint or verdict.message in ("silent", "no-f-string")
+                assert "{" not in verdict.observed + verdict.hint or verdict.message in (
+                    "silent",
+                    "no-f-string",
+                    "hidden",
+                )
 
 
 # --- faults that no animal shows ------------------------------------------------------------------------
@@ -238,6 +242,10 @@ def test_what_our_launcher_does_not_know_is_ours(solution: Evidence) -> None:
     for name in ("launch-starts", "launch-only-numeric", "launch-conversation"):
         assert found[name].status is Status.INCONCLUSIVE, name
         assert "Frobnicate" in found[name].observed
+    observed = with_scene(solution, SceneName.CONVERSATION, unknown)
+    withheld = score.score(observed, (*found.values(),), lab.rubric(), "").notes[0]
+    assert "where ROS 2 is sourced, it can be judged" in withheld
+    assert "again" not in withheld
 
 
 def test_too_slow_to_wrap_is_not_the_talker_s_fault(solution: Evidence) -> None:
@@ -280,7 +288,10 @@ def test_lines_and_messages_may_come_in_any_order(solution: Evidence) -> None:
 
 
 def test_without_its_scene_a_check_blames_what_is_missing(solution: Evidence) -> None:
-    found = verdicts(with_scene(solution, SceneName.ORIGINALS, lambda scene: None))
+    sources = tuple(file for file in solution.submission.sources if file.path != "launch/chatter.py")
+    without = with_scene(solution, SceneName.ORIGINALS, lambda scene: None)
+    without = msgspec.structs.replace(without, submission=msgspec.structs.replace(without.submission, sources=sources))
+    found = verdicts(without)
     assert found["originals-kept"].message == "no-launch"
     assert {v.status for n, v in found.items() if n != "originals-kept" and not n.startswith("git")} == {Status.PASS}
 
@@ -316,3 +327,20 @@ def test_the_period_is_a_note_and_no_verdict(solution: Evidence) -> None:
     assert scene is not None
     period = next(e.value for e in scene.events if isinstance(e, Measured) and e.name == "period_seconds")
     assert any(f"{period:g} s" in note for note in result.notes)
+
+
+def test_a_burst_has_no_period_to_speak_of(solution: Evidence) -> None:
+    def at_once(event: Event) -> Event:
+        is_period = isinstance(event, Measured) and event.name == "period_seconds"
+        return msgspec.structs.replace(event, value=0.0) if is_period else event
+
+    observed = with_events(solution, SceneName.CONVERSATION, at_once)
+    assert not any(
+        "about every" in note for note in score.score(observed, (*checks.judge(observed),), lab.rubric(), "").notes
+    )
+
+
+def test_where_the_numbers_went_instead_is_said(folder: Path) -> None:
+    found = verdicts(recorded("launch-moves-the-talker", folder))["launch-conversation"]
+    assert found.message == "nothing"
+    assert "/numbers" in found.observed

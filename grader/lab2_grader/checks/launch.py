@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from lab2_grader import lab
+from lab2_grader import lab, messages
 from lab2_grader.checks import source
 from lab2_grader.checks.talker import NO_NUMBERS
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, passed
@@ -25,7 +25,8 @@ COMMON_ERRORS = {
     "generate_launch_description": "no-function",
     "'NoneType' object has no attribute 'get_launch_arguments": "no-return",
 }
-ONLY_ONE = ("died", "called", "once")  # faults of talker-step after a single number
+# Faults of talker-step with which it is luck what others hear: a single number, or a new publisher for each.
+LUCK = ("died", "called", "once", "publishers")
 NEARBY, NEARBY_PER_MESSAGE = 100, 2  # lines that can belong to a message: so many, and so many for each before it
 NOT_WHAT_IT_RECEIVES = ("silent", "constant", "others", "noise", "no-f-string")  # a listener whose lines answer nothing
 QUEUE_FULL = 8  # numbers that wait for a listener whose queue holds ten, as in the worksheet: others may be lost by now
@@ -63,6 +64,9 @@ def launch_starts(view: View, earlier: Earlier) -> Verdict:
         return failed(check, key, error=error)
     if not started:
         return failed(check, "nothing")
+    file, line = source.condition_of(view, _launch_source(view), missing[0])
+    if line:
+        return failed(check, "condition", file, line, missing=names(missing))
     return failed(check, "others", started=names(started), missing=names(missing))
 
 
@@ -112,10 +116,8 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
         return blocked(check, *starts.because)
     if scene is None or starts.status is not Status.PASS:
         return blocked(check, "launch-starts")
-    if earlier["talker-step"].message in ONLY_ONE:
-        return blocked(
-            check, "talker-step"
-        )  # whether the pair had found each other by then is luck, and must not count
+    if earlier["talker-step"].message in LUCK:
+        return blocked(check, "talker-step")
     if earlier["talker-start"].message == "wrong-data":
         return blocked(check, "talker-start")  # whatever number went out, nobody meant it
     spoken = _spoken(view, scene)
@@ -138,13 +140,26 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
         if earlier[cause].status is not Status.PASS and silent_start:
             return blocked(check, *(earlier[cause].because or (cause,)))
     if not spoken:
-        return failed(check, "nothing")
+        return failed(check, "nothing", elsewhere=_elsewhere(view, scene))
+    if scene.ended_by_itself(own_listener):
+        file, line = scene.place_of_error(own_listener, view.specification.package)
+        return failed(check, "listener-died", file, line, error=scene.error_of(own_listener))
     if scene.flooded:
         return failed(check, "flood")
     if answered and _fell_behind(scene, topic, printed):
         return inconclusive(check, "inconclusive-behind")
+    file, line = source.unfinished_print(view, own_listener)
+    if line and not answered:
+        return failed(check, "unfinished", file, line, count=len(spoken))
     shown = ", ".join(str(message.data) for message in spoken[:5]) + (" …" if len(spoken) > 5 else "")
     return failed(check, "silent", shown=shown, printed=len(answered), count=len(spoken))
+
+
+def _elsewhere(view: View, scene: SceneView) -> str:
+    """Where the launched talker's numbers went instead, as the end of a sentence."""
+    topic = view.specification.number_topic
+    others = {endpoint.topic for endpoint in scene.appeared("publisher") if endpoint.type == topic.type} - {topic.name}
+    return messages.phrase("elsewhere", topics=names(others)) if others else ""
 
 
 def _spoken(view: View, scene: SceneView) -> list[Message]:

@@ -51,10 +51,13 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
         return wrong
     if scene.flooded:
         return failed(check, "flood")
+    hidden, file, line = source.hidden_log(view, scene.scene.label, topic.name)
+    if hidden:
+        return failed(check, "hidden", file, line, sent=len(sent), missing=len(missing), hidden=hidden)
     if len(missing) > len(sent) // 2:
         if literal := next((line for line in scene.lines if LITERAL.search(line.text)), None):
             return failed(check, "no-f-string", shown=said(literal.text))
-        if len(everything) == 1:
+        if len(everything) == 1 and sum(numbers_in(line.text) >= everything for line in scene.lines) > 1:
             return failed(check, "constant", sent=len(sent), shown=next(iter(everything)))
         if strange := _plausible(strange):
             shown = ", ".join(str(number) for number in sorted(strange)[:5])

@@ -31,8 +31,8 @@ def _period(view: View) -> list[str]:
     if scene is None or not view.numbers:
         return []
     found = []
-    if "period_seconds" in scene.measured:
-        found.append(messages.note("period", seconds=f"{scene.measured['period_seconds']:g}"))
+    if period := scene.measured.get("period_seconds"):
+        found.append(messages.note("period", seconds=f"{period:g}"))
     if scene.scene.follows_own_clock:
         found.append(messages.note("own-clock"))
     return found

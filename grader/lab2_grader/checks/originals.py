@@ -21,7 +21,8 @@ def originals_kept(view: View, earlier: Earlier) -> Verdict:
     original, topic = view.specification.original, view.specification.text_topic
     assert build is not None
     if scene is None:
-        return failed(check, "no-launch")
+        where = f"launch/{original.launch_file}"
+        return failed(check, "not-installed", where=where) if view.source(where) else failed(check, "no-launch")
     if fault := our_fault(check, scene):
         return fault
     pair = original.programs

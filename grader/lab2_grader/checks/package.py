@@ -44,6 +44,9 @@ def package_builds(view: View, earlier: Earlier) -> Verdict:
     file, line = source.joined_entry_points(view)
     if line:
         return failed(check, "comma", file, line)
+    called, file, line = source.setup_name(view)
+    if line and called != view.specification.package:
+        return failed(check, "name", file, line, called=called)
     return failed(check, "error", error=error)
 
 
@@ -77,7 +80,8 @@ def entry_points(view: View, earlier: Earlier) -> Verdict:
             return failed(check, "dash")
         lost = [name for name in missing if name in original]
         if lost and len(lost) == len(missing):
-            return failed(check, "replaced", name=lost[0], missing=names(lost), found=found)
+            lines = " ".join(f"'{name} = {specification.package}.{name}:main'," for name in lost)
+            return failed(check, "replaced", lines=lines, missing=names(lost), found=found)
         for name in (name for name in missing if name in numeric):
             if near := nearest(name, build.executables, specification.programs):
                 file, line = source.written_in(view, "setup.py", near)

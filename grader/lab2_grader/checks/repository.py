@@ -20,6 +20,8 @@ def git_pushed(view: View, earlier: Earlier) -> Verdict:
         return not_assessed(check, "not-assessed-git")
     if git.commit is None:
         return failed(check, "no-commit")
+    if git.submodule:
+        return failed(check, "submodule", path=git.submodule)
     if not git.committed_work:
         return failed(check, "no-work", missing=names(view.specification.work))
     if not git.remotes:

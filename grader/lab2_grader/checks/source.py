@@ -11,6 +11,7 @@ from lab2_grader.checks.view import View
 Place = tuple[str, int]  # file within the package, line from 1
 NOWHERE: Place = ("", 0)
 PRIVATE = re.compile(r"object has no attribute '(_[a-z]\w*)'")
+HIDING = ("throttle_duration_sec", "once", "skip_first")  # arguments of the logger with which not every line is shown
 ENTRY_POINT = re.compile(r"[\w-]+\s*=\s*[\w.]+:")  # name = package.module:function
 
 
@@ -76,6 +77,90 @@ def called_callback(view: View) -> Place:
             if any(isinstance(value, ast.Call) for value in given):
                 return path, node.lineno
     return NOWHERE
+
+
+def publisher_in_callback(view: View) -> Place:
+    """Where a method other than __init__ makes a publisher; NOWHERE when none does."""
+    path, tree = _talker(view)
+    for function in _walk(tree):
+        if isinstance(function, ast.FunctionDef) and function.name != "__init__":
+            for node in _walk(function):
+                if _is_call_of(node, "create_publisher"):
+                    return path, node.lineno
+    return NOWHERE
+
+
+def unfinished_print(view: View, program: str) -> Place:
+    """Where *program* prints something and no end of line after it; NOWHERE when it does not."""
+    path, tree = _parsed(view, file_of(view, program))
+    for node in _walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "print":
+            ends = [keyword.value for keyword in node.keywords if keyword.arg == "end"]
+            if any(
+                isinstance(end, ast.Constant) and isinstance(end.value, str) and "\n" not in end.value for end in ends
+            ):
+                return path, node.lineno
+    return NOWHERE
+
+
+def hidden_log(view: View, program: str, topic: str) -> tuple[str, str, int]:
+    """(what hides it, file, line) where the callback of *topic* logs in a way that does not always show; else empty."""
+    path, tree = _parsed(view, file_of(view, program))
+    callbacks = [callback for node in _walk(tree) if (callback := _callback_of(node, topic))]
+    for function in _walk(tree):
+        if isinstance(function, ast.FunctionDef) and function.name in callbacks:
+            for node in _walk(function):
+                if isinstance(node, ast.Call) and (hides := _hides(node)):
+                    return hides, path, node.lineno
+    return "", *NOWHERE
+
+
+def _callback_of(node: ast.AST, topic: str) -> str:
+    """The name of the callback when *node* subscribes to *topic*, else empty."""
+    if not isinstance(node, ast.Call) or not _is_call_of(node, "create_subscription"):
+        return ""
+    texts = [part.value for part in ast.walk(node) if isinstance(part, ast.Constant) and isinstance(part.value, str)]
+    given = [*node.args[2:3], *(keyword.value for keyword in node.keywords if keyword.arg == "callback")]
+    if not given or topic.lstrip("/") not in (text.lstrip("/") for text in texts):
+        return ""
+    callback = given[0]
+    return (
+        callback.attr if isinstance(callback, ast.Attribute) else callback.id if isinstance(callback, ast.Name) else ""
+    )
+
+
+def _hides(call: ast.Call) -> str:
+    if isinstance(call.func, ast.Attribute) and call.func.attr == "debug":
+        return ".debug(…)"
+    return next((f"{keyword.arg}=…" for keyword in call.keywords if keyword.arg in HIDING), "")
+
+
+def condition_of(view: View, path: str, executable: str) -> Place:
+    """Where the launch file *path* gives the node of *executable* a condition; NOWHERE when it does not."""
+    for node in _walk(_parsed(view, path)[1]):
+        if isinstance(node, ast.Call):
+            given = {keyword.arg: keyword.value for keyword in node.keywords}
+            named = given.get("executable")
+            if "condition" in given and isinstance(named, ast.Constant) and named.value == executable:
+                return path, given["condition"].lineno
+    return NOWHERE
+
+
+def setup_name(view: View) -> tuple[str, str, int]:
+    """(name, file, line) of the package as setup.py has it, in `package_name = …` or `setup(name=…)`; else empty."""
+    path = "setup.py"
+    for node in _walk(_parsed(view, path)[1]):
+        values: list[ast.expr] = []
+        if isinstance(node, ast.Assign) and any(
+            isinstance(t, ast.Name) and t.id == "package_name" for t in node.targets
+        ):
+            values = [node.value]
+        elif isinstance(node, ast.Call):
+            values = [keyword.value for keyword in node.keywords if keyword.arg == "name"]
+        for value in values:
+            if isinstance(value, ast.Constant) and isinstance(value.value, str):
+                return value.value, path, value.lineno
+    return "", *NOWHERE
 
 
 def is_of_rclpy(view: View, program: str, error: str) -> bool:

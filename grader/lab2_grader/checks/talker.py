@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -26,6 +27,7 @@ DEATHS = {
 # Faults of talker-start that leave nothing to count.
 NO_NUMBERS = ("silent", "died", "wrong-message", "wrong-data", "no-self")
 AT_CREATION = ("ended", "no-setter", "no-super", "two-types")
+FEW = 3  # publishers of one node on one topic: so many are no slip of the pen
 NOT_CALLABLE = "'NoneType' object is not callable"
 SILENT_SECONDS = 3.0  # no message for so long before the scene was stopped: it had stopped by itself
 
@@ -99,6 +101,12 @@ def _shows_publishers(view: View) -> bool:
     return published and bool(view.published)
 
 
+def _renews_publisher(view: View) -> bool:
+    """Whether one node keeps making new publishers of the numbers; what is published at once with a new one may be lost."""
+    publishers = {(endpoint.node, endpoint.gid) for endpoint in view.number_publishers}
+    return any(count >= FEW for count in Counter(node for node, _ in publishers).values())
+
+
 def _called_too_soon(view: View) -> bool:
     """Whether the timer was given None, for the callback was called in its place: once, perhaps before anybody could hear it."""
     scene, name = view.talking, view.talker_name
@@ -130,12 +138,16 @@ def talker_start(view: View, earlier: Earlier) -> Verdict:
     if sequel is None:
         return failed(check, "not-numbers", shown=", ".join(str(message.data) for message in view.numbers[:3]))
     smallest = view.specification.number_topic.smallest
+    if _renews_publisher(view) and sequel.irregular:
+        return blocked(check, "talker-step")
     missed = sequel.first_number - 1
     if missed and not sequel.common_rise:
         return blocked(check, "talker-step") if sequel.irregular else inconclusive(check, "inconclusive-lost")
     first = sequel.values[0] - missed * sequel.common_rise
     if first == smallest:
         return passed(check)
+    if not sequel.common_rise and sequel.irregular:
+        return failed(check, "no-count", first=first, shown=around(sequel.values, 0))
     file, line = source.early_increment(view)
     return failed(check, "other", file, line, first=first, shown=around(sequel.values, 0))
 
@@ -160,6 +172,8 @@ def talker_step(view: View, earlier: Earlier) -> Verdict:
     if not irregular:
         return passed(check)
     shown = around(sequel.values, irregular[0].index)
+    if _renews_publisher(view):
+        return failed(check, "publishers", *source.publisher_in_callback(view), shown=shown)
     rise = sequel.common_rise
     if rise == 0 and all(step.difference == 0 for step in irregular) and len(set(sequel.values)) == 1:
         return failed(check, "constant", shown=around(sequel.values, 0))
@@ -252,6 +266,9 @@ def talker_chatter(view: View, earlier: Earlier) -> Verdict:
     if publishers and earlier["talker-start"].message in NO_NUMBERS:
         return blocked(check, "talker-start")
     if publishers:
+        nodes = {endpoint.node for endpoint in publishers}
+        if view.number_publishers and nodes.isdisjoint(endpoint.node for endpoint in view.number_publishers):
+            return failed(check, "other-node", node=names(nodes))
         if overwritten := source.overwritten_publisher(view):
             attribute, file, line = overwritten
             return failed(check, "overwritten", file, line, attribute=attribute)

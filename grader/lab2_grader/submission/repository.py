@@ -62,6 +62,7 @@ def facts(top: Path, package_path: str, package: Path, files: tuple[str, ...], s
         products=tuple(clean(path, _NAME_LENGTH) for path in made[:_LISTED]),
         products_count=len(made),
         committed=git.committed(commit) if commit else "",
+        submodule=clean(_submodule(tree, package_path), _NAME_LENGTH),
     )
 
 
@@ -89,6 +90,11 @@ def _committed_work(paths: Iterable[str], package_path: str) -> tuple[str, ...]:
     """Those files of the exercise that are among *paths*, relative to the package."""
     held = frozenset(paths)
     return tuple(path for path in lab.specification().work if _prefix(package_path) + path in held)
+
+
+def _submodule(tree: Tree, package_path: str) -> str:
+    """The link of *tree* to another repository behind which the package lies; empty when there is none."""
+    return next((path for path in tree.submodules if f"{package_path}/".startswith(f"{path}/")), "")
 
 
 def _uncommitted(
