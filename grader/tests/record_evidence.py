@@ -23,7 +23,7 @@ RECORDED = (
         "talker-data-is-a-float",
     ),
     *("talker-without-super", "listener-without-super", "talker-dies-after-the-first"),
-    *("random-from-the-first", "publisher-in-the-callback", "rate-in-the-callback", "second-node-never-spins"),
+    *("random-from-the-first", "rate-in-the-callback", "second-node-never-spins"),
     *("listener-throttles", "listener-logs-once", "listener-prints-the-first", "listener-never-ends-its-lines"),
     *("listener-reads-arguments", "launch-files-by-another-pattern", "launch-on-a-condition", "setup-of-another-name"),
     "launch-moves-the-talker",

@@ -120,6 +120,7 @@ BY_HAND = (
     *BUILDS,
     *FLOODED,
     ("talker-step", "called"),
+    ("talker-step", "publishers"),
     ("launch-conversation", "strangers"),
     ("originals-kept", "strangers"),
 )
@@ -192,6 +193,29 @@ def test_a_callback_that_was_called_too_soon_is_named_whether_its_number_was_hea
     assert found["talker-wrap"].because == ("talker-step",)
     if not heard:
         assert found["talker-start"].because == found["launch-conversation"].because == ("talker-step",)
+
+
+@pytest.mark.parametrize("smallest_first", [True, False])
+def test_a_publisher_made_anew_in_each_callback_is_named(smallest_first: bool, folder: Path) -> None:
+    """What arrives then, and in which order, is luck; no animal can have it."""
+    observed = recorded("random-from-the-first", folder)
+    scene = observed.scene(SceneName.CONVERSATION)
+    assert scene is not None
+    topic = lab.specification().number_topic.name
+    one = next(e for e in scene.events if isinstance(e, Endpoint) and (e.kind, e.topic) == ("publisher", topic))
+    more = tuple(msgspec.structs.replace(one, gid=one.gid[:-4] + end) for end in ("1603", "1703", "1803"))
+
+    def renewed(scene: Scene) -> Scene:
+        first = next(e for e in scene.events if isinstance(e, Message) and e.topic == topic)
+        changed = msgspec.structs.replace(first, data=0) if smallest_first else first
+        events = (changed if event is first else event for event in scene.events)
+        return msgspec.structs.replace(scene, events=(*events, *more))
+
+    found = verdicts(with_scene(observed, SceneName.CONVERSATION, renewed))
+    assert (found["talker-step"].status, found["talker-step"].message) == (Status.FAIL, "publishers")
+    assert "once, in __init__" in found["talker-step"].hint
+    assert found["talker-start"].status is (Status.PASS if smallest_first else Status.BLOCKED)
+    assert found["talker-wrap"].because == ("talker-step",)
 
 
 @pytest.mark.parametrize(("check", "key"), FLOODED)

@@ -25,8 +25,7 @@ COMMON_ERRORS = {
     "generate_launch_description": "no-function",
     "'NoneType' object has no attribute 'get_launch_arguments": "no-return",
 }
-# Faults of talker-step with which it is luck what others hear: a single number, or a new publisher for each.
-LUCK = ("died", "called", "once", "publishers")
+ONLY_ONE = ("died", "called", "once")  # faults of talker-step after a single number: it is luck whether others hear it
 NEARBY, NEARBY_PER_MESSAGE = 100, 2  # lines that can belong to a message: so many, and so many for each before it
 NOT_WHAT_IT_RECEIVES = ("silent", "constant", "others", "noise", "no-f-string")  # a listener whose lines answer nothing
 QUEUE_FULL = 8  # numbers that wait for a listener whose queue holds ten, as in the worksheet: others may be lost by now
@@ -116,7 +115,7 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
         return blocked(check, *starts.because)
     if scene is None or starts.status is not Status.PASS:
         return blocked(check, "launch-starts")
-    if earlier["talker-step"].message in LUCK:
+    if earlier["talker-step"].message in ONLY_ONE:
         return blocked(check, "talker-step")
     if earlier["talker-start"].message == "wrong-data":
         return blocked(check, "talker-start")  # whatever number went out, nobody meant it
@@ -139,6 +138,8 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
         silent_start = cause != "talker-start" or earlier[cause].message in (*NO_NUMBERS, "not-numbers")
         if earlier[cause].status is not Status.PASS and silent_start:
             return blocked(check, *(earlier[cause].because or (cause,)))
+    if earlier["talker-step"].message == "publishers":
+        return blocked(check, "talker-step")
     if not spoken:
         return failed(check, "nothing", elsewhere=_elsewhere(view, scene))
     if scene.ended_by_itself(own_listener):

@@ -138,14 +138,14 @@ def talker_start(view: View, earlier: Earlier) -> Verdict:
     if sequel is None:
         return failed(check, "not-numbers", shown=", ".join(str(message.data) for message in view.numbers[:3]))
     smallest = view.specification.number_topic.smallest
-    if _renews_publisher(view) and sequel.irregular:
-        return blocked(check, "talker-step")
     missed = sequel.first_number - 1
     if missed and not sequel.common_rise:
         return blocked(check, "talker-step") if sequel.irregular else inconclusive(check, "inconclusive-lost")
     first = sequel.values[0] - missed * sequel.common_rise
     if first == smallest:
         return passed(check)
+    if _renews_publisher(view) and sequel.irregular:
+        return blocked(check, "talker-step")
     if not sequel.common_rise and sequel.irregular:
         return failed(check, "no-count", first=first, shown=around(sequel.values, 0))
     file, line = source.early_increment(view)
