@@ -10,6 +10,7 @@ import random
 import re
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -45,6 +46,7 @@ OBSERVER_MEMORY_BYTES = 1_000_000_000  # beyond what the submission may use
 OBSERVER_GRACE_SECONDS = 30.0
 EARLY_OBSERVERS = 3  # conversation, listener, originals: what a normal submission needs
 HEAD_START_SECONDS = 1.0  # of a scene over the next, at most; it ends sooner when its graph is there
+SEVERAL_PUBLISHERS = 3  # of one node on one topic: so many are made in a callback
 GRAPH_IS_THERE = b'"graph"'  # as the observer writes the name of that phase
 WORDS = (
     "amber",
@@ -213,7 +215,11 @@ class Stage:
             lambda started: self._conversation_and_talker(build, installed, started)
         ]
         if _launch_path(build, original.launch_file):
-            jobs.append(lambda started: (self._launched(SceneName.ORIGINALS, build, installed, original, started),))
+            jobs.append(
+                lambda started: (
+                    self._launched(SceneName.ORIGINALS, build, installed, original, started, Clock.REAL_TIME),
+                )
+            )
         if self._single(numeric.listener, build, installed) is not None:
             jobs.append(lambda started: (self._listener(build, installed, started),))
         with ThreadPoolExecutor(max_workers=len(jobs)) as pool:
@@ -237,13 +243,16 @@ class Stage:
         scenes: tuple[Scene, ...] = ()
         numeric = lab.specification().numeric
         if _launch_path(build, numeric.launch_file):
-            scenes = (self._launched(SceneName.CONVERSATION, build, installed, numeric, started),)
-            if _shows_talker(scenes[0], launched(numeric.talker, build)):
+            conversation = self._launched(SceneName.CONVERSATION, build, installed, numeric, started, self._clock)
+            if _makes_publishers(conversation):
+                conversation = self._launched(
+                    SceneName.CONVERSATION, build, installed, numeric, started, Clock.REAL_TIME
+                )
+            scenes = (conversation,)
+            if _shows_talker(conversation, launched(numeric.talker, build)):
                 return scenes
-        talker: Scene | None = None
-        if self._clock is Clock.TIME_LAPSE:
-            talker = self._talker(build, installed, started, Clock.TIME_LAPSE)
-        if talker is None or _died_silent(talker):  # over the arguments that the clock takes, perhaps
+        talker = self._talker(build, installed, started, self._clock)
+        if talker is not None and (_died_silent(talker) or _makes_publishers(talker)):
             talker = self._talker(build, installed, started, Clock.REAL_TIME)
         return (*scenes, talker) if talker is not None else scenes
 
@@ -257,9 +266,8 @@ class Stage:
         return self._play(ScenePlan(SceneName.TALKER, clock, request, label), how, started)
 
     def _launched(
-        self, name: SceneName, build: Build, installed: Path, pair: lab.Pair, started: threading.Event
+        self, name: SceneName, build: Build, installed: Path, pair: lab.Pair, started: threading.Event, clock: Clock
     ) -> Scene:
-        clock = self._clock if name is SceneName.CONVERSATION else Clock.REAL_TIME
         package = lab.specification().package
         path = f"{self._prefix(installed)}/share/{package}/{_launch_path(build, pair.launch_file)}"
         argv = self._ros.launch_argv(package, pair.launch_file, path, clock is Clock.TIME_LAPSE)
@@ -349,9 +357,24 @@ def _launch_path(build: Build, name: str) -> str:
 
 
 def _died_silent(scene: Scene) -> bool:
-    """Whether the program of *scene* ended by itself before it had published anything."""
+    """Whether the program of *scene*, which the grader's clock had given arguments, ended before it had published anything."""
     ended = any(isinstance(event, ProcessGone) and event.by is EndedBy.ITSELF for event in scene.events)
-    return ended and not any(isinstance(event, Message) for event in scene.events)
+    spoke = any(isinstance(event, Message) for event in scene.events)
+    return scene.clock is Clock.TIME_LAPSE and ended and not spoke
+
+
+def _makes_publishers(scene: Scene) -> bool:
+    """Whether a node of *scene* made publishers of the numbers again and again while the grader drove its clock.
+
+    Messages of different publishers overtake each other when they follow each other so fast; in real time they do not.
+    """
+    topic = lab.specification().number_topic.name
+    made = Counter(
+        event.node
+        for event in scene.events
+        if isinstance(event, Endpoint) and (event.kind, event.topic, event.event) == ("publisher", topic, "appeared")
+    )
+    return scene.clock is Clock.TIME_LAPSE and max(made.values(), default=0) >= SEVERAL_PUBLISHERS
 
 
 def _shows_talker(scene: Scene, talker: str) -> bool:

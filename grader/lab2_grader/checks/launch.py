@@ -140,11 +140,12 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
             return blocked(check, *(earlier[cause].because or (cause,)))
     if earlier["talker-step"].message == "publishers":
         return blocked(check, "talker-step")
+    dead = next((name for name in ((own_listener,) if spoken else view.pair) if scene.ended_by_itself(name)), "")
+    if dead:
+        file, line = scene.place_of_error(dead, view.specification.package)
+        return failed(check, "died", file, line, name=dead, error=scene.error_of(dead))
     if not spoken:
         return failed(check, "nothing", elsewhere=_elsewhere(view, scene))
-    if scene.ended_by_itself(own_listener):
-        file, line = scene.place_of_error(own_listener, view.specification.package)
-        return failed(check, "listener-died", file, line, error=scene.error_of(own_listener))
     if scene.flooded:
         return failed(check, "flood")
     if answered and _fell_behind(scene, topic, printed):
