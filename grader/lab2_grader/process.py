@@ -298,6 +298,8 @@ class Process:
         self._before = b""  # what came on standard error before the announcement
         self._name = f"{run_name()}-{next(_counter)}"
         argv = request.argv
+        if shutil.which(argv[0], path=dict(request.env).get("PATH")) is None:  # what is put before it would be started
+            raise FaultError(f"{self._shown} could not be started: it is not there, or no program.")
         if self._limits.file_bytes:
             argv = ("prlimit", f"--fsize={self._limits.file_bytes}", "--core=0", "--", *argv)
         self._base = control_groups() if self._limits.processes or self._limits.memory_bytes else None

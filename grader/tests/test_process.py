@@ -196,5 +196,5 @@ def test_walls_that_never_stood_are_a_fault_of_ours(script: str, said: str) -> N
 
 def test_what_is_not_there_cannot_be_started() -> None:
     request = Request(("/nowhere/at-all",), (), "/", Limits(seconds=5))
-    with pytest.raises(FaultError, match="could not be started: No such file"):
+    with pytest.raises(FaultError, match="could not be started: it is not there"):
         process.run(request)
