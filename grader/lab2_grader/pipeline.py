@@ -179,8 +179,11 @@ class _Recorder:
         self._faults: tuple[str, ...] = ()
         self._runtime = means.runtime
         self._run_seconds = 0.0
-        for name in report.NAMES:  # an earlier run's: they do not speak for this one
-            (folder / name).unlink(missing_ok=True)
+        for path in (folder / name for name in report.NAMES):  # an earlier run's: they do not speak for this one
+            try:
+                path.unlink(missing_ok=True)
+            except OSError as error:
+                raise evidence.cannot_write(path, error) from error
         self.writer = evidence.Writer(folder / EVIDENCE)
         self.writer.submission(facts)
         self.stage("submission")

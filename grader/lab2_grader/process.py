@@ -309,14 +309,9 @@ class Process:
         ignored = [number for number in ASKS_TO_END if signal.getsignal(number) is signal.SIG_IGN]
         if ignored:
             argv = ("env", *(f"--default-signal={number.name.removeprefix('SIG')}" for number in ignored), *argv)
-        self._wake_lock = threading.Lock()
-        self._wake_write: int | None
+        wake: tuple[int, ...] = ()
         try:
-            self._wake_read, self._wake_write = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
-        except OSError as error:
-            self._remove_group()
-            raise FaultError(f"{self._shown} could not be started: {error.strerror}.") from error
-        try:
+            wake = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
             self._popen = subprocess.Popen(
                 argv,
                 env={**dict(request.env), MARK: self._name},
@@ -327,10 +322,13 @@ class Process:
                 start_new_session=True,
             )
         except OSError as error:
-            os.close(self._wake_read)
-            os.close(self._wake_write)
+            for descriptor in wake:
+                os.close(descriptor)
             self._remove_group()
             raise FaultError(f"{self._shown} could not be started: {error.strerror}.") from error
+        self._wake_lock = threading.Lock()
+        self._wake_write: int | None
+        self._wake_read, self._wake_write = wake
         self.pid = self._popen.pid
         self._pump = threading.Thread(target=self._run, name=f"pump-{self.pid}", daemon=True)
         try:

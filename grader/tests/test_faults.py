@@ -241,7 +241,8 @@ def test_what_an_earlier_run_said_does_not_outlive_it(
 def test_the_folder_for_the_results_is_read_only(means: pipeline.Means, tmp_path: Path) -> None:
     _needs_walls(means)
     closed = tmp_path / "closed"
-    closed.mkdir()
+    (closed / "out").mkdir(parents=True)
+    (closed / "out" / "report.md").write_text("of an earlier run")
     run = _grade(closed / "out", "bwrap", "--dev-bind", "/", "/", "--ro-bind", str(closed), str(closed), "--")
     assert run.returncode == 2, run.stderr
     assert str(closed) in run.stderr

@@ -122,19 +122,15 @@ def _folder(inbox: Path, out: Path) -> Found:
             unknown.append(Unknown(folder.name, "the folder is empty"))
         else:
             entries.append(_plain(folder, folder.name))
-    archives = [Path(part.place) for part in rest if _suffix(part.path)]
-    downloads = [_download(path) for path in archives] if not entries else []
-    if downloads and all(downloads):
-        for found in filter(None, downloads):
-            entries += found[0]
-            unknown += found[1]
-    else:
-        # One student's archive may not speak for another, whatever the names in it look like.
+    paths = [Path(part.place) for part in rest]
+    archives = [path for path in paths if _suffix(path.name) and path.is_file()]
+    downloads = _downloads(archives) if not entries else []
+    for found in downloads:
+        entries += found[0]
+        unknown += found[1]
+    if not downloads:
         entries += [_plain(path, path.name[: -len(_suffix(path.name))]) for path in archives]
-    for part in rest:
-        path = Path(part.place)
-        if path in archives:
-            continue
+    for path in sorted(set(paths).difference(archives)):
         table = _table(path) if path.is_file() else None
         if table is not None:
             entries += table[0]
@@ -142,6 +138,16 @@ def _folder(inbox: Path, out: Path) -> Found:
         else:
             unknown.append(Unknown(clean(path.name, 200), "neither a folder nor an archive (.zip, .tar.gz)"))
     return entries, unknown
+
+
+def _downloads(archives: list[Path]) -> list[Found]:
+    """What *archives* hold when each is a download; else nothing: one student's archive may not speak for another."""
+    downloads = []
+    for path in archives:
+        if (found := _download(path)) is None:
+            return []
+        downloads.append(found)
+    return downloads
 
 
 def _plain(path: Path, name: str) -> Entry:
