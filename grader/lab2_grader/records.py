@@ -8,6 +8,8 @@ Sequences are tuples; nothing here prints, renders or reads a file.
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable
 from enum import Enum
 
 import msgspec
@@ -278,6 +280,15 @@ class Endpoint(Row, frozen=True):
     reliability: str
     durability: str
     program: str = ""
+
+
+SEVERAL_PUBLISHERS = 3  # of one node on one topic: so many are made in a callback
+
+
+def renews_publisher(publishers: Iterable[Endpoint]) -> bool:
+    """Whether one node keeps making new publishers, of *publishers* on one topic: what is sent at once with one may be lost."""
+    nodes = Counter(node for node, _ in {(endpoint.node, endpoint.gid) for endpoint in publishers})
+    return max(nodes.values(), default=0) >= SEVERAL_PUBLISHERS
 
 
 class Message(Row, frozen=True):

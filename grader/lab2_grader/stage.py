@@ -10,7 +10,6 @@ import random
 import re
 import threading
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -34,6 +33,7 @@ from lab2_grader.records import (
     Scene,
     SceneName,
     ScenePlan,
+    renews_publisher,
 )
 from lab2_grader.ros import Ros
 from lab2_grader.ros.domains import Domain
@@ -46,7 +46,6 @@ OBSERVER_MEMORY_BYTES = 1_000_000_000  # beyond what the submission may use
 OBSERVER_GRACE_SECONDS = 30.0
 EARLY_OBSERVERS = 3  # conversation, listener, originals: what a normal submission needs
 HEAD_START_SECONDS = 1.0  # of a scene over the next, at most; it ends sooner when its graph is there
-SEVERAL_PUBLISHERS = 3  # of one node on one topic: so many are made in a callback
 GRAPH_IS_THERE = b'"graph"'  # as the observer writes the name of that phase
 WORDS = (
     "amber",
@@ -369,12 +368,12 @@ def _makes_publishers(scene: Scene) -> bool:
     Messages of different publishers overtake each other when they follow each other so fast; in real time they do not.
     """
     topic = lab.specification().number_topic.name
-    made = Counter(
-        event.node
+    made = (
+        event
         for event in scene.events
         if isinstance(event, Endpoint) and (event.kind, event.topic, event.event) == ("publisher", topic, "appeared")
     )
-    return scene.clock is Clock.TIME_LAPSE and max(made.values(), default=0) >= SEVERAL_PUBLISHERS
+    return scene.clock is Clock.TIME_LAPSE and renews_publisher(made)
 
 
 def _shows_talker(scene: Scene, talker: str) -> bool:

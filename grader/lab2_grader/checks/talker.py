@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -11,7 +10,7 @@ from lab2_grader.checks.sequence import Sequel, Step, around
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, no_program, passed
 from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
-from lab2_grader.records import SceneName, Status, Verdict
+from lab2_grader.records import SceneName, Status, Verdict, renews_publisher
 
 Earlier = Mapping[str, Verdict]
 
@@ -27,7 +26,6 @@ DEATHS = {
 # Faults of talker-start that leave nothing to count.
 NO_NUMBERS = ("silent", "died", "wrong-message", "wrong-data", "no-self")
 AT_CREATION = ("ended", "no-setter", "no-super", "two-types")
-FEW = 3  # publishers of one node on one topic: so many are no slip of the pen
 NOT_CALLABLE = "'NoneType' object is not callable"
 SILENT_SECONDS = 3.0  # no message for so long before the scene was stopped: it had stopped by itself
 
@@ -101,12 +99,6 @@ def _shows_publishers(view: View) -> bool:
     return published and bool(view.published)
 
 
-def _renews_publisher(view: View) -> bool:
-    """Whether one node keeps making new publishers of the numbers; what is published at once with a new one may be lost."""
-    publishers = {(endpoint.node, endpoint.gid) for endpoint in view.number_publishers}
-    return any(count >= FEW for count in Counter(node for node, _ in publishers).values())
-
-
 def _called_too_soon(view: View) -> bool:
     """Whether the timer was given None, for the callback was called in its place: once, perhaps before anybody could hear it."""
     scene, name = view.talking, view.talker_name
@@ -144,7 +136,7 @@ def talker_start(view: View, earlier: Earlier) -> Verdict:
     first = sequel.values[0] - missed * sequel.common_rise
     if first == smallest:
         return passed(check)
-    if _renews_publisher(view) and sequel.irregular:
+    if renews_publisher(view.number_publishers) and sequel.irregular:
         return blocked(check, "talker-step")
     if not sequel.common_rise and sequel.irregular:
         return failed(check, "no-count", first=first, shown=around(sequel.values, 0))
@@ -172,7 +164,7 @@ def talker_step(view: View, earlier: Earlier) -> Verdict:
     if not irregular:
         return passed(check)
     shown = around(sequel.values, irregular[0].index)
-    if _renews_publisher(view):
+    if renews_publisher(view.number_publishers):
         return failed(check, "publishers", *source.publisher_in_callback(view), shown=shown)
     rise = sequel.common_rise
     if rise == 0 and all(step.difference == 0 for step in irregular) and len(set(sequel.values)) == 1:
