@@ -26,7 +26,7 @@ RECORDED = (
     *("random-from-the-first", "rate-in-the-callback", "second-node-never-spins"),
     *("listener-throttles", "listener-logs-once", "listener-prints-the-first", "listener-never-ends-its-lines"),
     *("listener-reads-arguments", "launch-files-by-another-pattern", "launch-on-a-condition", "setup-of-another-name"),
-    "launch-moves-the-talker",
+    *("launch-moves-the-talker", "listener-does-not-spin"),
 )
 
 

@@ -25,6 +25,7 @@ from lab2_grader.records import (
     Phase,
     Scene,
     SceneName,
+    Sent,
     Status,
     Unsupported,
     Verdict,
@@ -193,6 +194,22 @@ def test_a_callback_that_was_called_too_soon_is_named_whether_its_number_was_hea
     assert found["talker-wrap"].because == ("talker-step",)
     if not heard:
         assert found["talker-start"].because == found["launch-conversation"].because == ("talker-step",)
+
+
+@pytest.mark.parametrize("name", ["listener-does-not-spin", "listener-without-super"])
+def test_what_was_sent_to_a_listener_that_was_ending_is_not_what_ended_it(name: str, folder: Path) -> None:
+    """On a slow machine its subscription is matched, and something sent, before its process is gone."""
+    observed = recorded(name, folder)
+    scene = observed.scene(SceneName.LISTENER)
+    assert scene is not None and not any(isinstance(event, Sent) for event in scene.events)
+    texts = lab.specification().text_topic.name
+    at = next(event.at for event in reversed(scene.events) if isinstance(event, Line | Phase))
+    late = with_scene(
+        observed,
+        SceneName.LISTENER,
+        lambda scene: msgspec.structs.replace(scene, events=(*scene.events, Sent(at + 0.001, texts, "0417"))),
+    )
+    assert verdicts(late) == verdicts(observed)
 
 
 @pytest.mark.parametrize("smallest_first", [True, False])

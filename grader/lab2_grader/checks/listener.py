@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from lab2_grader import messages
 from lab2_grader.checks import source
 from lab2_grader.checks.verdicts import blocked, failed, inconclusive, no_program, passed
-from lab2_grader.checks.view import SceneView, View, names
+from lab2_grader.checks.view import TRACEBACK, SceneView, View, names
 from lab2_grader.near import nearest
 from lab2_grader.reading import numbers_in, said
 from lab2_grader.records import Endpoint, SceneName, Sent, Verdict
@@ -86,7 +86,7 @@ def listener_chatter(view: View, earlier: Earlier) -> Verdict:
     if death == topic.name:
         file, line = scene.place_of_error(scene.scene.label, view.specification.package)
         return failed(check, "died", file, line, error=scene.error_of(scene.scene.label))
-    if death and not missing:
+    if death == AT_START or (death and not missing):
         return blocked(check, "listener-numeric")
     if wrong := _unsuitable(check, topic.name, topic.type, view, scene):
         return wrong
@@ -100,10 +100,21 @@ def _sent(scene: SceneView, topic: str) -> list[Sent]:
 
 
 def _death(scene: SceneView) -> str:
-    """The topic over whose message the listener ended, AT_START when nothing had been sent; empty when it lived."""
+    """The topic over whose message the listener ended, AT_START when no message had to do with it; empty when it lived."""
     if not scene.ended_by_itself(scene.scene.label):
         return ""
-    return scene.sent[-1].topic if scene.sent else AT_START
+    return scene.sent[-1].topic if _handled_something(scene) else AT_START
+
+
+def _handled_something(scene: SceneView) -> bool:
+    """Whether a message may have ended the listener: one that ends as soon as it is a node can be sent something too."""
+    if not scene.sent:
+        return False
+    lines = scene.lines_of(scene.scene.label)
+    if any(TRACEBACK in line.text for line in lines):
+        return scene.died_in_spin(scene.scene.label)
+    quietly = scene.ended is not None and scene.ended.code == 0
+    return not quietly or any(line.at >= scene.sent[0].at for line in lines)
 
 
 def _numbers_printed(scene: SceneView) -> dict[float, frozenset[int]]:
