@@ -11,6 +11,7 @@ import traceback
 from collections.abc import Sequence
 from contextlib import nullcontext
 from datetime import datetime
+from enum import Enum
 from pathlib import Path
 from types import FrameType
 
@@ -107,7 +108,7 @@ def _parser() -> argparse.ArgumentParser:
     grade.add_argument("--out", type=Path, help="where the result goes (default: results/<name>)")
     grade.add_argument("--rubric", type=Path, help="a rubric of your own")
     grade.add_argument("--ros", choices=("auto", "sourced", "wheels"), default="auto", help="which ROS to use")
-    grade.add_argument("--clock", type=Clock, choices=list(Clock), default=Clock.TIME_LAPSE, help="how time is driven")
+    grade.add_argument("--clock", choices=_values(Clock), default=Clock.TIME_LAPSE.value, help="how time is driven")
     grade.add_argument("--isolation", choices=("auto", "off"), default="auto", help="off: run it with your own rights")
     grade.add_argument("--fail-under", type=int, metavar="N", help="exit with 1 when the mark is below N")
     grade.add_argument("--ci", action="store_true", help="in a GitHub workflow: job summary, annotations, outputs")
@@ -131,9 +132,7 @@ def _parser() -> argparse.ArgumentParser:
         "--scheduler", default="", metavar="ADDRESS", help="send the work to a Dask cluster (tcp://…)"
     )
     grade_all.add_argument("--ros", choices=("auto", "sourced", "wheels"), default="auto", help="which ROS to use")
-    grade_all.add_argument(
-        "--clock", type=Clock, choices=list(Clock), default=Clock.TIME_LAPSE, help="how time is driven"
-    )
+    grade_all.add_argument("--clock", choices=_values(Clock), default=Clock.TIME_LAPSE.value, help="how time is driven")
     grade_all.add_argument(
         "--isolation", choices=("auto", "off"), default="auto", help="off: run them with your own rights"
     )
@@ -158,9 +157,7 @@ def _parser() -> argparse.ArgumentParser:
     show = commands.add_parser("report", help="show a result in another format, or its messages as a recording")
     show.add_argument("result", type=Path, help="the folder of a result")
     show.add_argument("--format", choices=tuple(report.FORMATS), help="print this format (default: a table)")
-    show.add_argument(
-        "--audience", type=Audience, choices=list(Audience), default=Audience.STUDENT, help="who reads it"
-    )
+    show.add_argument("--audience", choices=_values(Audience), default=Audience.STUDENT.value, help="who reads it")
     show.add_argument("--output", type=Path, metavar="FILE", help="write the format to FILE instead")
     show.add_argument("--bag", type=Path, metavar="DIR", help="write what was observed as rosbag2 recordings (MCAP)")
     show.set_defaults(run=_report)
@@ -218,7 +215,7 @@ def _means(arguments: argparse.Namespace) -> pipeline.Means:
         err.print(Text(sandbox.protections_off(isolation), style="bold yellow"))
         if isolation.mend:
             err.print(Text(f"To mend it: {isolation.mend}"))
-    return pipeline.Means(ros.find(arguments.ros), isolation, lab.rubric(arguments.rubric), arguments.clock)
+    return pipeline.Means(ros.find(arguments.ros), isolation, lab.rubric(arguments.rubric), Clock(arguments.clock))
 
 
 def _outlets(arguments: argparse.Namespace) -> tuple[Outlet, ...]:
@@ -249,7 +246,7 @@ def _grade_all(arguments: argparse.Namespace) -> int:
         inbox=arguments.inbox,
         out=str(arguments.out),
         rubric=lab.rubric(arguments.rubric),
-        clock=arguments.clock,
+        clock=Clock(arguments.clock),
         ros=arguments.ros,
         isolation=arguments.isolation != "off",
         jobs=arguments.jobs,
@@ -306,7 +303,7 @@ def _report(arguments: argparse.Namespace) -> int:
         if arguments.bag is None:
             out.print(terminal(result))
         return GRADED
-    shown = report.report_of(result, observed, arguments.audience)
+    shown = report.report_of(result, observed, Audience(arguments.audience))
     if arguments.format == "classroom50":
         if not result.graded:
             raise FaultError("The mark is withheld, and Classroom 50 has no word for that: nothing was written.")
@@ -356,6 +353,10 @@ def _positive(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError("give a whole number from 1")
     return int(text)
+
+
+def _values(kind: type[Enum]) -> list[str]:
+    return [member.value for member in kind]
 
 
 def _deadline(text: str) -> datetime:

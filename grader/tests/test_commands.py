@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -87,6 +88,14 @@ def test_what_cannot_be_graded_is_refused_in_a_sentence(tmp_path: Path, name: st
 
 def test_an_unknown_option_is_wrong_usage(tmp_path: Path) -> None:
     assert run("grade", ".", "--no-such-option", cwd=tmp_path).returncode == 2
+
+
+@pytest.mark.parametrize("command", ["grade", "grade-all", "report"])
+def test_help_offers_what_can_be_typed(command: str, tmp_path: Path) -> None:
+    offered = re.findall(r"\{([^}]*)\}", run(command, "--help", cwd=tmp_path).stdout)
+
+    assert offered
+    assert all(re.fullmatch(r"[a-z0-9-]+", choice.strip()) for choices in offered for choice in choices.split(","))
 
 
 def test_rescoring_gives_the_same_bytes(tmp_path: Path) -> None:
