@@ -20,6 +20,7 @@ from typing import TypeVar
 
 import msgspec
 
+from lab2_grader import decoding
 from lab2_grader.errors import FaultError, Lab2Error, UsageError
 from lab2_grader.records import (
     EVIDENCE_SCHEMA,
@@ -88,9 +89,6 @@ class Manifest(Record, frozen=True):
 
 class _Version(msgspec.Struct, frozen=True):
     schema: str = ""
-
-
-_events = msgspec.json.Decoder(tuple[Event, ...])
 
 
 def write_atomically(path: Path, data: bytes) -> None:
@@ -173,7 +171,7 @@ def events(raw: bytes) -> tuple[Event, ...]:
         msgspec.DecodeError: A whole line is not an event.
     """
     whole = raw[: raw.rfind(b"\n") + 1].rstrip(b"\n")
-    return _events.decode(b"[" + whole.replace(b"\n", b",") + b"]")
+    return decoding.from_json(b"[" + whole.replace(b"\n", b",") + b"]", tuple[Event, ...])
 
 
 def read(folder: Path) -> Evidence:
@@ -239,6 +237,6 @@ def _bytes(path: Path) -> bytes:
 
 def _decode(path: Path, raw: bytes, kind: type[T]) -> T:
     try:
-        return msgspec.json.decode(raw, type=kind)
+        return decoding.from_json(raw, kind)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise UsageError(f"{path} is damaged: {error}. Grade the submission again.") from error

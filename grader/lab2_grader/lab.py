@@ -10,6 +10,7 @@ from typing import TypeVar
 
 import msgspec
 
+from lab2_grader import decoding
 from lab2_grader.errors import UsageError
 from lab2_grader.records import Limits, Record
 
@@ -276,7 +277,7 @@ def read(path: Path, kind: type[T]) -> T:
         UsageError: It cannot be read, is no TOML, or has a key or value that is not allowed; the text names it.
     """
     try:
-        return msgspec.toml.decode(path.read_bytes(), type=kind)
+        return decoding.from_toml(path.read_bytes(), kind)
     except OSError as error:
         raise UsageError(f"{path} cannot be read: {error.strerror}.") from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:

@@ -13,7 +13,7 @@ from typing import Protocol
 
 import msgspec
 
-from lab2_grader import lab, messages
+from lab2_grader import decoding, lab, messages
 from lab2_grader.errors import RefusedError, UsageError
 from lab2_grader.evidence import write_atomically
 from lab2_grader.records import Evidence, Result
@@ -148,7 +148,7 @@ class _Metadata(msgspec.Struct):
 def _total_points(path: Path) -> float | None:
     """What the assignment is worth in Gradescope; None when its metadata do not say."""
     try:
-        return float(msgspec.json.decode(path.read_bytes(), type=_Metadata).assignment.total_points or "") or None
+        return float(decoding.from_json(path.read_bytes(), _Metadata).assignment.total_points or "") or None
     except (OSError, ValueError, msgspec.DecodeError):
         return None
 

@@ -9,7 +9,19 @@ from pathlib import Path
 
 import msgspec
 
-from lab2_grader import __version__, checks, evidence, messages, process, provenance, report, ros, sandbox, submission
+from lab2_grader import (
+    __version__,
+    checks,
+    decoding,
+    evidence,
+    messages,
+    process,
+    provenance,
+    report,
+    ros,
+    sandbox,
+    submission,
+)
 from lab2_grader.build import build
 from lab2_grader.errors import FaultError, UsageError
 from lab2_grader.lab import Rubric
@@ -150,7 +162,7 @@ def read(folder: Path) -> tuple[Result, Evidence]:
     """
     path = folder / report.RESULT
     try:
-        result = msgspec.json.decode(path.read_bytes(), type=Result)
+        result = decoding.from_json(path.read_bytes(), Result)
     except OSError as error:
         raise UsageError(f"There is no result at {path} ({error.strerror}). Grade the submission first.") from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:

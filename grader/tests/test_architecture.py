@@ -23,7 +23,7 @@ LAUNCHER = PACKAGE / "ros" / "launcher"  # a program of its own, run inside the 
 
 # From the top down: a module imports only from those above it, or from its own group.
 LAYERS = (
-    ("records", "errors", "text", "tar", "reading", "near"),
+    ("records", "errors", "text", "tar", "decoding", "reading", "near"),
     ("lab", "sections"),
     ("messages", "stand_in"),
     ("process", "cgroup"),
@@ -103,6 +103,18 @@ def test_imports_go_up_only(name: str) -> None:
             assert other == here or LEVEL[other] < LEVEL[here] or other in LAYERS[LEVEL[here]], (
                 f"{name} imports {other}"
             )
+
+
+def test_one_module_decodes() -> None:
+    """Elsewhere two threads that are the first to decode a type would end the interpreter; see `decoding`."""
+    names = {
+        name
+        for name, tree in MODULES.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute)
+        and re.fullmatch(r"msgspec(\.\w+)?\.(decode|Decoder|convert)", ast.unparse(node))
+    }
+    assert names == {"decoding.py"}
 
 
 def test_a_class_is_graded_from_the_top_down() -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import msgspec
 
+from lab2_grader import decoding
 from lab2_grader.classroom import work
 from lab2_grader.classroom.pool import StoppedError
 from lab2_grader.classroom.records import Graded
@@ -60,7 +61,7 @@ class Cluster:
         for worker, answer in answers.items():
             if not isinstance(answer, bytes):
                 raise UsageError(f"The worker {worker} cannot grade: {answer}")
-            found = msgspec.json.decode(answer, type=Version)
+            found = decoding.from_json(answer, Version)
             for what, theirs, ours in (
                 ("grader", found.code, work.code_digest()),
                 ("rubric", found.rubric, own_digest),

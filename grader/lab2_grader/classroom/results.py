@@ -19,7 +19,7 @@ from pathlib import Path
 
 import msgspec
 
-from lab2_grader import evidence, pipeline, report
+from lab2_grader import decoding, evidence, pipeline, report
 from lab2_grader.classroom.records import Stamp
 from lab2_grader.classroom.work import code_digest, unpack
 from lab2_grader.errors import UsageError
@@ -78,7 +78,7 @@ def key_of(facts: SubmissionFacts, clock: Clock, ros: str, *, isolation: bool) -
 def stamp(folder: Path) -> Stamp | None:
     """The stamp of the result in *folder*; None when there is none."""
     try:
-        return msgspec.json.decode((folder / STAMP).read_bytes(), type=Stamp)
+        return decoding.from_json((folder / STAMP).read_bytes(), Stamp)
     except (OSError, msgspec.DecodeError, UnicodeDecodeError):
         return None
 
@@ -91,7 +91,7 @@ def restamp(folder: Path, known: Stamp) -> None:
 def result(folder: Path) -> Result | None:
     """The result in *folder*; None when there is none that can be read."""
     try:
-        return msgspec.json.decode((folder / report.RESULT).read_bytes(), type=Result)
+        return decoding.from_json((folder / report.RESULT).read_bytes(), Result)
     except (OSError, msgspec.DecodeError, UnicodeDecodeError):
         return None
 

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import msgspec
 
-from lab2_grader import process, submission
+from lab2_grader import decoding, process, submission
 from lab2_grader.classroom import inbox, pool, results, summary, work
 from lab2_grader.classroom.cluster import Cluster
 from lab2_grader.classroom.pool import StoppedError
@@ -201,7 +201,7 @@ class _Run:
             packed = work.pack(package)
         task = Task(facts, packed, order.rubric, order.clock, order.ros, order.isolation, work.code_digest())
         attempts = self._attempts[entry.name] = self._attempts.get(entry.name, 0) + 1
-        graded = msgspec.msgpack.decode(self._perform(msgspec.msgpack.encode(task), doing), type=Graded)
+        graded = decoding.from_msgpack(self._perform(msgspec.msgpack.encode(task), doing), Graded)
         if self._lanes.stopping.is_set():
             raise StoppedError
         if not graded.result:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from lab2_grader import __version__, lab
+from lab2_grader import __version__, decoding, lab
 from lab2_grader.classroom.records import Stamp
 from lab2_grader.classroom.work import code_digest
 from lab2_grader.errors import UsageError
@@ -176,7 +176,7 @@ def read(out: Path) -> ClassSummary:
     """
     path = out / JSON
     try:
-        return msgspec.json.decode(path.read_bytes(), type=ClassSummary)
+        return decoding.from_json(path.read_bytes(), ClassSummary)
     except OSError as error:
         raise UsageError(f"There is no summary of a class at {path}. Give a folder that `grade-all` wrote.") from error
     except (msgspec.DecodeError, UnicodeDecodeError) as error:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import msgspec
 
-from lab2_grader import __version__, evidence, lab, pipeline, process, ros, sandbox
+from lab2_grader import __version__, decoding, evidence, lab, pipeline, process, ros, sandbox
 from lab2_grader.classroom.records import Graded, Task
 from lab2_grader.errors import FaultError, Lab2Error
 from lab2_grader.lab import Rubric
@@ -110,7 +110,7 @@ def perform(task: bytes, doing: Doing = lambda _: None) -> bytes:
         A `Graded` in msgpack; faults of the grader or the machine are told in it, not raised.
     """
     try:
-        graded = _perform(msgspec.msgpack.decode(task, type=Task), doing)
+        graded = _perform(decoding.from_msgpack(task, Task), doing)
     except (Lab2Error, OSError, MemoryError, msgspec.MsgspecError) as error:
         graded = Graded(b"", fault=str(error) or type(error).__name__)
     return msgspec.msgpack.encode(graded)

@@ -9,9 +9,7 @@ from __future__ import annotations
 import os
 import sys
 
-import msgspec
-
-from lab2_grader import process
+from lab2_grader import decoding, process
 from lab2_grader.observe import scenes
 from lab2_grader.observe.observer import Observer
 from lab2_grader.observe.recorder import Recorder
@@ -26,7 +24,7 @@ def main() -> None:
     line = sys.stdin.buffer.readline()
     if not line:
         return  # nobody wants this observer any more
-    scenes.play(observer, msgspec.json.decode(line, type=ScenePlan))
+    scenes.play(observer, decoding.from_json(line, ScenePlan))
     recorder.flush()
 
 
