@@ -86,7 +86,8 @@ def zoo(
     request: pytest.FixtureRequest, means: Means, tmp_path_factory: pytest.TempPathFactory, real_time_zoo: Zoo
 ) -> Iterator[Zoo]:
     """The animals that this run of the tests asks for, being graded side by side; those in real time wait meanwhile."""
-    wanted = _asked_for(request, test_gets_its_verdicts.__name__)
+    tests = (test_gets_its_verdicts, test_the_period_is_said_as_it_was_written)
+    wanted = dict.fromkeys(name for test in tests for name in _asked_for(request, test.__name__))
     with Zoo(means, tmp_path_factory.mktemp("zoo"), [ANIMALS[name] for name in wanted]) as zoo:
         yield zoo
 
@@ -101,6 +102,15 @@ def test_gets_its_verdicts(zoo: Zoo, name: str) -> None:
     result = zoo.result(name)
     assert not complaints(ANIMALS[name], result.checks)
     assert result.score == sum(c.max_points for c in result.checks if c.status is Status.PASS)
+
+
+@pytest.mark.parametrize(
+    ("name", "seconds"), [("solution", "0.5"), ("period-of-a-tenth", "0.1"), ("period-of-two-seconds", "2")]
+)
+def test_the_period_is_said_as_it_was_written(zoo: Zoo, name: str, seconds: str) -> None:
+    """A busy machine answers late; it may then say nothing of the period, but nothing that is not so."""
+    said = [note for note in zoo.result(name).notes if "about every" in note]
+    assert said in ([], [f"The numeric talker publishes about every {seconds} s."])
 
 
 @pytest.mark.parametrize(
