@@ -13,7 +13,6 @@ import ctypes
 import functools
 import itertools
 import os
-import resource
 import secrets
 import selectors
 import shutil
@@ -28,7 +27,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import TypeVar
 
-from lab2_grader import cgroup, lab
+from lab2_grader import cgroup, lab, process_table
 from lab2_grader.errors import FaultError
 from lab2_grader.records import EndedBy, Limits, Outcome, Request
 from lab2_grader.text import clean
@@ -36,7 +35,6 @@ from lab2_grader.text import clean
 POLL_SECONDS = 0.1
 CHUNK_BYTES = 65_536
 LAST_OUTPUT_SECONDS = 0.5  # how long output of an ended process is waited for
-PAGE_BYTES = resource.getpagesize()
 PR_SET_CHILD_SUBREAPER = 36
 
 # Ignored by what runs in the background of a script (POSIX 2.11) or under nohup, and inherited by what that starts: a
@@ -45,8 +43,6 @@ ASKS_TO_END = (signal.SIGINT, signal.SIGQUIT, signal.SIGHUP)
 
 # The Python that runs the grader, under the name by which the sandbox knows it too: without `..`, links not followed.
 PYTHON = os.path.abspath(sys.executable)  # noqa: PTH100 resolve() follows links, out of the virtual environment
-
-CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 
 # A variable in the environment of every process of one run, to find strays by: the run, and below it the process, and
 # below that (an observer's) its processes.
@@ -97,171 +93,6 @@ def control_groups() -> cgroup.Base | None:
         finally:
             group.remove()
     return None
-
-
-class ProcessInfo:
-    """A line of the process table: `pid`, `parent` and `command` (its arguments).
-
-    `inside_pid` is the number by which it knows itself, in its own pid namespace.
-    """
-
-    __slots__ = ("command", "inside_pid", "parent", "pid")
-
-    def __init__(self, pid: int, inside_pid: int, parent: int, command: tuple[str, ...]) -> None:
-        self.pid = pid
-        self.inside_pid = inside_pid
-        self.parent = parent
-        self.command = command
-
-
-class _Stat:
-    """What the kernel counts of one process; `cpu_seconds` with that of its children that have ended.
-
-    `started` (in ticks since the machine was) tells it from another that is given its number later.
-    """
-
-    __slots__ = ("_fields", "parent")
-
-    def __init__(self, fields: list[bytes]) -> None:
-        self.parent = int(fields[1])
-        self._fields = fields
-
-    @property
-    def cpu_seconds(self) -> float:
-        return sum(map(int, self._fields[11:15])) / CLOCK_TICKS
-
-    @property
-    def threads(self) -> int:
-        return int(self._fields[17])
-
-    @property
-    def resident(self) -> int:
-        return int(self._fields[21]) * PAGE_BYTES
-
-    @property
-    def started(self) -> int:
-        return int(self._fields[19])
-
-
-def _stat(pid: int) -> _Stat | None:
-    """What is counted of *pid*, or None when it is gone or a zombie."""
-    try:  # every scene and every build asks this of every process ten times a second: no objects around three calls
-        descriptor = os.open(f"/proc/{pid}/stat", os.O_RDONLY | os.O_CLOEXEC)
-    except OSError:
-        return None
-    try:
-        text = os.read(descriptor, 1_024)
-    except OSError:
-        return None
-    finally:
-        os.close(descriptor)
-    fields = text[text.rindex(b")") + 2 :].split()
-    if fields[0] in (b"Z", b"X"):
-        return None
-    return _Stat(fields)
-
-
-def _descendants(root: int) -> dict[int, _Stat]:
-    """*root* and all its living descendants, with what `_stat` says of each."""
-    table: dict[int, _Stat] = {}
-    children: dict[int, list[int]] = {}
-    for name in os.listdir("/proc"):
-        if name[0] in "123456789" and (found := _stat(int(name))) is not None:
-            table[int(name)] = found
-            children.setdefault(found.parent, []).append(int(name))
-    tree: dict[int, _Stat] = {}
-    pending = [root]
-    while pending:
-        pid = pending.pop()
-        if pid in table and pid not in tree:
-            tree[pid] = table[pid]
-        pending.extend(children.pop(pid, ()))
-    return tree
-
-
-@functools.cache
-def _can_walk() -> bool:
-    """Whether the kernel lists the children of a thread (`CONFIG_PROC_CHILDREN`)."""
-    return Path(f"/proc/self/task/{threading.get_native_id()}/children").exists()
-
-
-def _walk(root: int) -> dict[int, _Stat]:
-    """As `_descendants`, from child to child: quicker, but a child may be passed over while a sibling of it ends."""
-    if not _can_walk():
-        return _descendants(root)
-    tree: dict[int, _Stat] = {}
-    pending = [root]
-    while pending:
-        pid = pending.pop()
-        if pid in tree or (found := _stat(pid)) is None:
-            continue
-        tree[pid] = found
-        with contextlib.suppress(OSError):
-            for thread in os.listdir(f"/proc/{pid}/task"):
-                with open(f"/proc/{pid}/task/{thread}/children", "rb") as children:  # noqa: PTH123
-                    pending += map(int, children.read().split())
-    return tree
-
-
-def alive(pid: int) -> bool:
-    """Whether *pid* is a living process."""
-    return _stat(pid) is not None
-
-
-def _signal_same(pid: int, number: signal.Signals, seen: _Stat) -> None:
-    """Signal *pid*, if it still is the process that was *seen*: numbers are given again, here and on busy machines soon."""
-    try:
-        descriptor = os.pidfd_open(pid)
-    except OSError:
-        return
-    try:
-        now = _stat(pid)
-        if now is not None and now.started == seen.started:
-            signal.pidfd_send_signal(descriptor, number)
-    except OSError:
-        pass
-    finally:
-        os.close(descriptor)
-
-
-@contextlib.contextmanager
-def held(pids: Iterable[int]) -> Iterator[None]:
-    """Keep the processes *pids* from running until the block ends."""
-    seen = [(pid, stat) for pid in pids if (stat := _stat(pid)) is not None]
-    try:
-        for pid, stat in seen:
-            _signal_same(pid, signal.SIGSTOP, stat)
-        yield
-    finally:
-        for pid, stat in seen:
-            _signal_same(pid, signal.SIGCONT, stat)
-
-
-def tree(root: int) -> tuple[ProcessInfo, ...]:
-    """The living processes below and including *root*, by pid, each with its arguments."""
-    found = []
-    for pid, stat in sorted(_walk(root).items()):
-        try:
-            raw = Path(f"/proc/{pid}/cmdline").read_bytes()
-            status = Path(f"/proc/{pid}/status").read_bytes()
-        except OSError:
-            continue
-        command = tuple(part.decode(errors="replace") for part in raw.rstrip(b"\0").split(b"\0"))
-        numbers = next((line for line in status.splitlines() if line.startswith(b"NSpid:")), b"").split()
-        inside = int(numbers[-1]) if len(numbers) > 1 else pid
-        found.append(ProcessInfo(pid, inside, stat.parent, command))
-    return tuple(found)
-
-
-def busy(pids: Iterable[int]) -> bool:
-    """Whether a thread of one of the processes *pids* runs, or waits for a processor or a disk."""
-    for pid in pids:
-        with contextlib.suppress(OSError):
-            for thread in Path(f"/proc/{pid}/task").iterdir():
-                text = (thread / "stat").read_bytes()
-                if text[text.rindex(b")") + 2 :][:1] in (b"R", b"D"):
-                    return True
-    return False
 
 
 class Process:
@@ -527,7 +358,7 @@ class Process:
         if self._group is not None:
             struck = self._group.struck()
             return struck or ("cpu" if limits.cpu_seconds and self._group.cpu_seconds() > limits.cpu_seconds else "")
-        found = _walk(self.pid).values()
+        found = process_table.walk(self.pid).values()
         if limits.processes and sum(stat.threads for stat in found) > limits.processes:
             return "processes"
         if limits.memory_bytes and sum(stat.resident for stat in found) > limits.memory_bytes:
@@ -583,12 +414,14 @@ class Process:
         if self._group is not None:
             self._group.kill()
         for _ in range(20):
-            own = _descendants(self.pid)
-            alive = own | {pid: stat for pid, stat in _descendants(os.getpid()).items() if self._marked(pid)}
+            own = process_table.descendants(self.pid)
+            alive = own | {
+                pid: stat for pid, stat in process_table.descendants(os.getpid()).items() if self._marked(pid)
+            }
             if not alive:
                 return
             for pid, stat in alive.items():
-                _signal_same(pid, signal.SIGKILL, stat)
+                process_table.signal_same(pid, signal.SIGKILL, stat)
 
     def _marked(self, pid: int) -> bool:
         """Whether *pid* carries the mark of this process, or of one that it started in turn."""

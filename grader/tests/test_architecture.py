@@ -26,7 +26,7 @@ LAYERS = (
     ("records", "errors", "text", "tar", "decoding", "reading", "near"),
     ("lab", "sections"),
     ("messages", "stand_in"),
-    ("process", "cgroup"),
+    ("process", "process_table", "cgroup"),
     ("sandbox",),
     ("ros",),
     ("submission",),

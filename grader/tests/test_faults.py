@@ -23,7 +23,7 @@ import traces
 from zoo_builder import ROOT
 
 import lab2_grader
-from lab2_grader import pipeline, process, report
+from lab2_grader import pipeline, process, process_table, report
 from lab2_grader.observe.observer import BLIND_SECONDS, Observer
 from lab2_grader.observe.recorder import Recorder
 from lab2_grader.records import Limits, Request, Result, Status
@@ -145,7 +145,7 @@ def test_the_observer_is_killed_in_mid_scene(means: pipeline.Means, tmp_path: Pa
             assert not grading.done()
             # The observer that has a launch below it is the one that plays; it is killed as soon as a node runs there.
             for observer in _observers():
-                below = process.tree(observer)
+                below = process_table.tree(observer)
                 if any("/lib/lab2/numeric_talker" in " ".join(info.command) for info in below):
                     os.kill(observer, signal.SIGKILL)
                     killed.append(observer)
@@ -163,7 +163,7 @@ def test_the_observer_is_killed_in_mid_scene(means: pipeline.Means, tmp_path: Pa
 
 def _observers() -> list[int]:
     """The observers that this process runs: the Python process itself, not what stands around it."""
-    own = [info for info in process.tree(os.getpid()) if "lab2_grader.observe" in info.command]
+    own = [info for info in process_table.tree(os.getpid()) if "lab2_grader.observe" in info.command]
     return [info.pid for info in own if "bwrap" not in info.command[0] and info.command[0] != "sh"]
 
 

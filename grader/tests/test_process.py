@@ -14,7 +14,7 @@ import msgspec
 import pytest
 from zoo_builder import ROOT
 
-from lab2_grader import lab, process
+from lab2_grader import lab, process, process_table
 from lab2_grader.errors import FaultError
 from lab2_grader.records import EndedBy, Limits, Request
 
@@ -116,8 +116,8 @@ def test_who_is_deaf_is_killed_with_all_that_it_started(ladder: Callable[[float,
         outcome = started.process.wait()
         assert 0.4 <= time.monotonic() - asked < 30  # it would sleep for ten minutes
     assert (outcome.signal, outcome.code, outcome.ended_by) == (signal.SIGKILL, None, EndedBy.GRADER)
-    assert not process.alive(started.process.pid)
-    assert until(lambda: not process.alive(grandchild))
+    assert not process_table.alive(started.process.pid)
+    assert until(lambda: not process_table.alive(grandchild))
 
 
 def test_at_its_deadline_a_process_is_stopped_like_at_a_call() -> None:
@@ -141,23 +141,23 @@ def test_what_ends_by_itself_is_not_said_to_be_stopped() -> None:
 def test_what_is_held_does_not_run_and_then_goes_on() -> None:
     with Started("while :; do :; done") as started:
         pid = started.process.pid
-        assert until(lambda: process.busy([pid]))
-        with contextlib.suppress(ValueError), process.held([pid]):
-            assert until(lambda: not process.busy([pid]))
-            before = process._stat(pid)
+        assert until(lambda: process_table.busy([pid]))
+        with contextlib.suppress(ValueError), process_table.held([pid]):
+            assert until(lambda: not process_table.busy([pid]))
+            before = process_table.stat(pid)
             time.sleep(0.2)
-            after = process._stat(pid)
+            after = process_table.stat(pid)
             assert before is not None and after is not None and before.cpu_seconds == after.cpu_seconds
             raise ValueError
-        assert until(lambda: process.busy([pid]))
+        assert until(lambda: process_table.busy([pid]))
 
 
 def test_who_waits_is_not_busy_and_who_is_gone_is_nobody() -> None:
     with Started("echo ready; exec sleep 600") as started:
-        assert until(lambda: b"ready" in started.printed and not process.busy([started.process.pid]))
+        assert until(lambda: b"ready" in started.printed and not process_table.busy([started.process.pid]))
     gone = started.process.pid
-    assert not process.alive(gone) and not process.busy([gone])
-    with process.held([gone]):
+    assert not process_table.alive(gone) and not process_table.busy([gone])
+    with process_table.held([gone]):
         pass
 
 

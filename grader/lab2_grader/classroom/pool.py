@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from lab2_grader import process
+from lab2_grader import process_table
 
 MEMORY_EACH = 900_000_000  # bytes that one submission may need at its height: eight ROS processes and a build
 LANES_FOR_EACH_JOB = 4  # submissions at once that wait in real time do not need a core each
@@ -163,7 +163,7 @@ class Lanes(Generic[Item, Made]):
 
 def kill_all() -> None:
     """Kill everything that this process has started, directly or not, but for what tidies up behind it."""
-    for info in process.tree(os.getpid()):
+    for info in process_table.tree(os.getpid()):
         if info.pid != os.getpid() and KEPT not in info.command:
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.kill(info.pid, signal.SIGKILL)

@@ -24,7 +24,7 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from lab2_grader import lab, process
+from lab2_grader import lab, process, process_table
 from lab2_grader.observe.output import OutputLines
 from lab2_grader.observe.recorder import Recorder
 from lab2_grader.records import (
@@ -97,7 +97,7 @@ class Observer:
         self._program: process.Process | None = None
         self._splitters: dict[str, OutputLines] = {}
         self._processes: dict[int, str] = {}
-        self._table: dict[int, process.ProcessInfo] = {}
+        self._table: dict[int, process_table.ProcessInfo] = {}
         self._kept: Counter[str] = Counter()
         self._dropped: Counter[str] = Counter()
         self.ended_executables: frozenset[str] = frozenset()
@@ -160,16 +160,16 @@ class Observer:
 
         Only once nothing of the program has work to do, so that what it was about to print has been printed.
         """
-        idle = self.until(lambda: not process.busy(self._table), IDLE_SECONDS)
-        return process.held([pid for pid, name in self._processes.items() if name == executable and idle])
+        idle = self.until(lambda: not process_table.busy(self._table), IDLE_SECONDS)
+        return process_table.held([pid for pid, name in self._processes.items() if name == executable and idle])
 
     def _look_at_processes(self) -> None:
         if self._program is None:
             return
-        found = {info.pid: info for info in process.tree(self._program.pid)} if self._program.running else {}
+        found = {info.pid: info for info in process_table.tree(self._program.pid)} if self._program.running else {}
         self._table = found
         now = self.recorder.now()
-        if process.busy(found):
+        if process_table.busy(found):
             self._changed_at = now
         elif (blind := now - self._looked_at) > BLIND_SECONDS:  # nobody knows what was done meanwhile
             self._changed_at = min(now, self._changed_at + blind)
@@ -185,7 +185,7 @@ class Observer:
                 if executable:
                     command = clean(" ".join(info.command), 500)
                     self.recorder.write(ProcessSeen(self.recorder.now(), pid, clean(executable, 100), command))
-        for pid in [pid for pid in self._processes if pid not in found and not process.alive(pid)]:
+        for pid in [pid for pid in self._processes if pid not in found and not process_table.alive(pid)]:
             if executable := self._processes.pop(pid):
                 self.ended_executables |= {executable}
                 by = EndedBy.GRADER if self._stopping else EndedBy.ITSELF
