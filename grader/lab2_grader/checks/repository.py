@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import re
+import shlex
 from collections.abc import Mapping
+from pathlib import PurePosixPath
 
 from lab2_grader import lab, messages
 from lab2_grader.checks.verdicts import failed, not_assessed, passed
 from lab2_grader.checks.view import View, names
 from lab2_grader.records import Verdict
+from lab2_grader.submission.products import COLCON
 
 Earlier = Mapping[str, Verdict]
 
@@ -54,5 +58,13 @@ def git_clean(view: View, earlier: Earlier) -> Verdict:
     if not git.products:
         return passed(check)
     more = messages.phrase("more", count=git.products_count - 3) if git.products_count > 3 else ""
-    folders = " ".join(sorted({path.split("/")[0] for path in git.products}))
-    return failed(check, "products", examples=", ".join(git.products[:3]), more=more, folders=folders)
+    by_colcon = any(PurePosixPath(path).name in COLCON for path in git.products)
+    key = "products" if by_colcon else "caches"
+    return failed(check, key, examples=", ".join(git.products[:3]), more=more, paths=_arguments(git.products))
+
+
+def _arguments(paths: tuple[str, ...]) -> str:
+    """*paths* for a command line, as many as fit: each whole, for beside it may lie the student's own work."""
+    words = [shlex.quote(path.rstrip("/")) for path in paths]
+    fit = itertools.accumulate(words, lambda length, word: length + 1 + len(word), initial=0)
+    return " ".join(word for word, length in zip(words, list(fit)[1:], strict=True) if length <= messages.VALUE_LENGTH)
