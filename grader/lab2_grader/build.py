@@ -218,7 +218,7 @@ def _dangling(prefix: Path, package: str) -> tuple[str, ...]:
 
 
 def without_function(build: Build, installed: Path) -> frozenset[str]:
-    """Executables whose entry point names a function that its module does not define, as far as its syntax tree tells.
+    """Executables whose entry point names no function that its module defines, as far as its syntax tree tells.
 
     Args:
         build: What was built.
@@ -240,13 +240,19 @@ def _defines(path: Path, name: str) -> bool:
         tree = ast.parse(path.read_bytes())
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return True
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef) and node.name == name:
-            return True
+    pending: list[ast.AST] = [tree]
+    while pending:
+        node = pending.pop()
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id == name:
             return True
         if isinstance(node, ast.alias) and (node.asname or node.name) in (name, "*"):
             return True
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name == name:
+            return True
+        if not isinstance(
+            node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+        ):  # what is in there is not at the top
+            pending += ast.iter_child_nodes(node)
     return False
 
 

@@ -27,6 +27,7 @@ COMMON_ERRORS = {
 }
 ONLY_ONE = ("died", "called", "once")  # faults of talker-step after a single number: it is luck whether others hear it
 NEARBY, NEARBY_PER_MESSAGE = 100, 2  # lines that can belong to a message: so many, and so many for each before it
+MISLED = ("dangling", "wrong-module", "misplaced", "function", "no-function", "class", "indented")  # an entry point
 NOT_WHAT_IT_RECEIVES = ("silent", "constant", "others", "noise", "no-f-string")  # a listener whose lines answer nothing
 QUEUE_FULL = 8  # numbers that wait for a listener whose queue holds ten, as in the worksheet: others may be lost by now
 ENOUGH_ANSWERS = 8  # of the slow dozen; the first few may be lost while the pair still discovers each other
@@ -128,7 +129,7 @@ def launch_conversation(view: View, earlier: Earlier) -> Verdict:
     theirs = scene.spoke(topic, talker) and scene.heard(topic, own_listener)
     if theirs and _is_conversation(spoken, answered) and listener.message not in NOT_WHAT_IT_RECEIVES:
         return passed(check)
-    if earlier["entry-points"].message in ("dangling", "function", "wrong-module", "misplaced"):
+    if earlier["entry-points"].message in MISLED:
         return blocked(check, "entry-points")
     if not scene.spoke(topic, talker):
         speakers = {endpoint.program for endpoint in scene.appeared("publisher") if endpoint.topic == topic} - {talker}

@@ -16,6 +16,7 @@ from lab2_grader.records import Endpoint, SceneName, Sent, Verdict
 Earlier = Mapping[str, Verdict]
 
 LITERAL = re.compile(r"\{[^{}]*\.data[^{}]*\}")  # what an f-string without its f prints
+NOT_ONE_ARGUMENT = "callable with one argument"  # rclpy of a callback that does not take self and a message
 AT_START = "at start"
 NOISE = 64  # so many different numbers that were never sent: whatever is sent would stand among them
 
@@ -40,11 +41,14 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
         file, line = scene.place_of_error(scene.scene.label, view.specification.package)
         if death == topic.name:
             return failed(check, "died-on-number", file, line, error=scene.error_of(scene.scene.label))
+        if death == AT_START and earlier["entry-points"].message == "indented":
+            return blocked(check, "entry-points")
         if death == AT_START and scene.ended is not None and scene.ended.code == 0:
             return failed(check, "ended")
         if death == AT_START:
             error = scene.error_of(scene.scene.label)
-            key = "no-super" if source.is_of_rclpy(view, scene.scene.label, error) else "died"
+            key = "arguments" if NOT_ONE_ARGUMENT in error else "died"
+            key = "no-super" if source.is_of_rclpy(view, scene.scene.label, error) else key
             return failed(check, key, file, line, error=error)
         return blocked(check, "listener-chatter")
     if wrong := _unsuitable(check, topic.name, topic.type, view, scene):
@@ -61,7 +65,8 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
             return failed(check, "constant", sent=len(sent), shown=next(iter(everything)))
         if strange := _plausible(strange):
             shown = ", ".join(str(number) for number in sorted(strange)[:5])
-            return failed(check, "others", sent=", ".join(str(row.data) for row in sent[:5]), shown=shown)
+            numbers = ", ".join(str(row.data) for row in sent[:5])
+            return failed(check, "others", sent=numbers, shown=shown, last=_last_line(scene))
     if len(missing) == len(sent):
         return failed(check, "silent", sent=len(sent), shown=_last_line(scene))
     examples = ", ".join(str(row.data) for row in missing[:5])

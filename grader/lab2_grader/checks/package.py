@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from lab2_grader import messages
 from lab2_grader.checks import source
 from lab2_grader.checks.verdicts import failed, inconclusive, passed
-from lab2_grader.checks.view import View, names
+from lab2_grader.checks.view import SceneView, View, names
 from lab2_grader.near import nearest
 from lab2_grader.records import Build, EndedBy, Verdict
 from lab2_grader.stand_in import misdirected
@@ -19,6 +19,7 @@ PLACE = re.compile(r'File "([^"]+)", line (\d+)')
 READ_BY_COLCON = (
     "<unknown>"  # the text in which colcon cannot read what setup.py says: something was printed besides it
 )
+NOT_INITIALISED = "NotInitializedException"
 ERROR_LINE = re.compile(r"^\s*((?:[A-Za-z_.]*(?:Error|Exception)|error)\b.*)$")
 
 
@@ -96,9 +97,9 @@ def entry_points(view: View, earlier: Earlier) -> Verdict:
             file, line = source.written_in(view, "setup.py", targets[name])
             return failed(check, "wrong-module", file, line, name=name, target=targets[name], module=module)
     for name in specification.programs:
-        if name in targets and _function_is_missing(view, name, targets[name]):
+        if name in targets and (key := _no_function(view, name, targets[name])):
             file, line = source.written_in(view, "setup.py", targets[name])
-            return failed(check, "function", file, line, name=name, target=targets[name])
+            return failed(check, key, file, line, name=name, target=targets[name])
     return passed(check)
 
 
@@ -115,8 +116,19 @@ def _dangling(view: View, build: Build, name: str, target: str) -> Verdict:
     return failed(check, "dangling", file, line, name=name, target=target, modules=modules)
 
 
-def _function_is_missing(view: View, name: str, target: str) -> bool:
-    """Whether the executable was run and said that its module has no such function."""
-    module, _, function = target.partition(":")
-    said = f"module '{module.strip()}' has no attribute '{function.strip()}'"
-    return any(scene.says(name, said) for scene in view.scenes())
+def _no_function(view: View, name: str, target: str) -> str:
+    """Which fault it is that *target* names no function, as the executable said when it was run; empty when it is none."""
+    module, function = (part.strip() for part in target.partition(":")[::2])
+    if not function:
+        return "no-function"
+    if any(scene.says(name, f"module '{module}' has no attribute '{function}'") for scene in view.scenes()):
+        return "indented" if source.is_method(view, name, function) else "function"
+    return "class" if any(_makes_a_node_at_once(scene, name, function) for scene in view.scenes()) else ""
+
+
+def _makes_a_node_at_once(scene: SceneView, name: str, function: str) -> bool:
+    """Whether rclpy was not initialised when *name* made its node, and neither *function* nor a module was running."""
+    if not scene.says(name, NOT_INITIALISED):
+        return False
+    above = re.compile(rf'\.py", line \d+, in (<module>|{re.escape(function)})$')
+    return not any(above.search(line.text) for line in scene.lines_of(name))

@@ -199,6 +199,13 @@ def joined_entry_points(view: View) -> Place:
     return NOWHERE
 
 
+def is_method(view: View, program: str, function: str) -> bool:
+    """Whether *function* stands inside a class in the file of *program*."""
+    nodes = _walk(_parsed(view, file_of(view, program))[1])
+    inside = (part for node in nodes if isinstance(node, ast.ClassDef) for part in node.body)
+    return any(isinstance(part, ast.FunctionDef) and part.name == function for part in inside)
+
+
 def file_of(view: View, program: str) -> str:
     """The file that *program* is made from, as its entry point says."""
     package, build = view.specification.package, view.build

@@ -43,6 +43,8 @@ def talker_type(view: View, earlier: Earlier) -> Verdict:
     if scene.ended_by_itself(view.talker_name) and not view.numbers and scene.scene.name is SceneName.CONVERSATION:
         return blocked(check, "entry-points")  # there was nothing else that could be run in its place
     if (death := _death(view)) and not _shows_publishers(view):
+        if earlier["entry-points"].message == "indented":
+            return blocked(check, "entry-points")
         key = death.key if death.key in AT_CREATION else "died"
         return failed(check, key, death.file, death.line, error=death.error, found=death.error, talker=view.talker_name)
     if not publishers:
@@ -215,7 +217,8 @@ def _bad_return(step: Step, sequel: Sequel, view: View) -> Verdict:
     check, topic = "talker-wrap", view.specification.number_topic
     shown = around(sequel.values, step.index)
     if step.after == -topic.largest - 1:
-        return failed(check, "overflow", next=step.after, shown=shown)
+        late = topic.smallest in sequel.values[step.index + 1 : step.index + 2]
+        return failed(check, "late" if late else "overflow", next=step.after, shown=shown)
     if step.before > topic.largest:
         return failed(check, "too-large", shown=shown)
     file, line = source.wrap_comparison(view)
