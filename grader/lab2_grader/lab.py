@@ -164,6 +164,7 @@ class ListenerLimits(Record, frozen=True):
 
     numbers: int
     texts: int
+    paced: int
     answer_seconds: float
 
 

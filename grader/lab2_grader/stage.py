@@ -282,7 +282,7 @@ class Stage:
         single = self._single(listener, build, installed, remappings)
         assert single is not None
         how, label, request = single
-        numbers = tuple(self._random.sample(range(-128, 128), limits.numbers + 1))
+        numbers = tuple(self._random.sample(range(-128, 128), 1 + limits.numbers + limits.paced))
         texts = tuple(" ".join(self._random.sample(WORDS, 3)) for _ in range(limits.texts + 1))
         plan = ScenePlan(SceneName.LISTENER, Clock.REAL_TIME, request, label, numbers=numbers, texts=texts)
         return self._play(plan, how, started)
@@ -401,20 +401,29 @@ def _remappings_that_help(scenes: Mapping[SceneName, Scene], listener: str) -> t
     """The remappings (`-r from:=to …`) with which the launch brings the *listener* to the topics; empty for none needed.
 
     A listener that speaks of another topic, which its launch file remaps to the right one, is right (VERDICTS). By itself
-    it would miss what is sent, so it is listened to again as the launch starts it.
+    it would miss what is sent, so it is listened to again as the launch starts it. Where the launch gave it the name in
+    another way (a parameter), the topic that it has by itself instead is remapped.
     """
     alone, together = scenes.get(SceneName.LISTENER), scenes.get(SceneName.CONVERSATION)
     if alone is None or together is None:
         return ()
-    topics = {lab.specification().number_topic.name, lab.specification().text_topic.name}
-    if not (topics & _subscribed(together)) - _subscribed(alone):
+    here, there = _subscribed(alone), _subscribed(together)
+    topics = (lab.specification().number_topic, lab.specification().text_topic)
+    missed = [topic for topic in topics if topic.name in there and topic.name not in here]
+    if not missed:
         return ()
     commands = (e.command for e in together.events if isinstance(e, ProcessSeen) and e.executable == listener)
     found = REMAPPING.findall(next(commands, ""))
+    if all(remapping.startswith("__") for remapping in found):  # the names of the node and its namespace
+        instead = {topic.name: [name for name in here if here[name] == topic.type] for topic in missed}
+        found += [f"{names[0]}:={topic}" for topic, names in instead.items() if len(names) == 1]
     return tuple(word for remapping in found for word in ("-r", remapping))
 
 
-def _subscribed(scene: Scene) -> frozenset[str]:
-    return frozenset(
-        event.topic for event in scene.events if isinstance(event, Endpoint) and event.kind == "subscription"
-    )
+def _subscribed(scene: Scene) -> dict[str, str]:
+    """The topics that were subscribed to, with their types."""
+    return {
+        event.topic: event.type
+        for event in scene.events
+        if isinstance(event, Endpoint) and event.kind == "subscription"
+    }

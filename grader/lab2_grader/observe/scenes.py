@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 import time
 from collections.abc import Callable
 
@@ -178,6 +179,7 @@ class _Post:
         self._publisher = observer.publisher(topic, type_name)
         self._warm_up, *self._pending = data
         self._ear = ear
+        self.waits: list[float] = []  # for each answer, or for none
 
     def prepare(self) -> None:
         """Find the subscription and warm up; without one, or when the listener ends over it, nothing is pending."""
@@ -205,20 +207,44 @@ class _Post:
 
     def send_next(self) -> None:
         """Send one and wait for the answer."""
+        began = time.monotonic()
         self._send(self._pending.pop(0))
+        self.waits.append(time.monotonic() - began)
 
-    def _send(self, data: int | str, seconds: float | None = None) -> bool:
+    def send_at_pace(self, data: tuple[int | str, ...], seconds: float) -> None:
+        """Send *data*, so many *seconds* apart, answered or not, and then wait for the answers.
+
+        A machine that keeps the listener waiting is given more time, so that a queue for one message is enough.
+        """
         since = len(self._observer.lines)
+        for one in data:
+            self._publish(one)
+            due = time.monotonic() + seconds
+
+            def taken(due: float = due) -> bool:
+                waited = time.monotonic() >= due and self._observer.quiet_seconds > BRIEF_SECONDS
+                return waited or not self._observer.alive()
+
+            self._observer.until(taken, WARM_UP_TRIES * seconds)
+        for one in data:
+            self._ear.hears(_prints(one), since)
+
+    def _publish(self, data: int | str) -> None:
         assert self._type is not None
         self._publisher.publish(self._type(data=data))
         self._observer.recorder.write(Sent(self._observer.recorder.now(), self._topic, data))
+
+    def _send(self, data: int | str, seconds: float | None = None) -> bool:
+        since = len(self._observer.lines)
+        self._publish(data)
         return self._ear.hears(_prints(data), since, seconds)
 
 
 def _listener(observer: Observer, plan: ScenePlan) -> None:
     """The listener by itself: the grader publishes what it made up and waits for each to be printed.
 
-    Texts come first, so that a listener that falls over the first number has still shown what it does with them.
+    Texts come first, so that a listener that falls over the first number has still shown what it does with them. One that
+    answers late may print the last number now and then instead of each: further numbers do not wait for its answers.
     """
     specification, limits = lab.specification(), lab.limits().listener
     number_topic, text_topic = specification.number_topic, specification.text_topic
@@ -226,7 +252,8 @@ def _listener(observer: Observer, plan: ScenePlan) -> None:
     def ear() -> _Ear:
         return _Ear(observer, plan.label, limits.answer_seconds)
 
-    numbers = _Post(observer, number_topic.name, number_topic.type, plan.numbers, ear())
+    one_by_one, at_pace = plan.numbers[: limits.numbers + 1], plan.numbers[limits.numbers + 1 :]
+    numbers = _Post(observer, number_topic.name, number_topic.type, one_by_one, ear())
     texts = _Post(observer, text_topic.name, text_topic.type, plan.texts, ear())
     wanted = frozenset(("subscription", topic.name) for topic in (number_topic, text_topic))
     _start(observer, plan, wanted)
@@ -241,6 +268,10 @@ def _listener(observer: Observer, plan: ScenePlan) -> None:
             texts.send_next()
     while texts.pending:
         texts.send_next()
+    period = text_topic.period_seconds
+    if numbers.waits and statistics.median(numbers.waits) > period / 2 and observer.alive():
+        _phase(observer, "pace")
+        numbers.send_at_pace(at_pace, period)
     # What is printed late counts too, however slow the machine is.
     observer.until(lambda: observer.quiet_seconds > LAST_WORD_SECONDS or not observer.alive(), limits.answer_seconds)
 
