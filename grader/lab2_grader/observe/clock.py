@@ -109,11 +109,17 @@ class LockStep:
         if self._follows:
             self._refine_period()
 
-    def half_step(self) -> None:
-        """Move the clock by half a period, once after each tick: other timers than the talker's may be waiting for it."""
-        if self._follows and not self._ahead:
-            self._ahead = self._period / 2
-            self._advance(self._ahead)
+    def nudge(self) -> bool:
+        """Move the clock by a tenth of a period, for other timers than the talker's may be waiting for that.
+
+        False when it is half way to the next tick: further would be too far for a talker that was measured badly.
+        """
+        tenth = max(round(self._period / 10, 6), PROBE_SECONDS)
+        if not self._follows or self._ahead + tenth > self._period / 2:
+            return False
+        self._advance(tenth)
+        self._ahead += tenth
+        return True
 
     # --- ticks ------------------------------------------------------------------------------
 

@@ -16,6 +16,7 @@ NO_NODE_SECONDS = 8.0  # a program that has done nothing for so long, and is no 
 WARM_UP_TRIES = 4
 WARM_UP_SECONDS = 0.5
 PARTIAL_LINE_SECONDS = 0.2
+NUDGE_SECONDS = 0.05
 PATIENCE = 2  # after so many answers that did not come, the next are waited for only while there is work going on
 MATCH_SECONDS = 3.0  # from a subscription in the graph to one that is matched; one that asks for more never is
 BRIEF_SECONDS = 0.15  # without any work
@@ -82,11 +83,11 @@ class _Ear:
         fits: Callable[[str], bool],
         since: int,
         seconds: float | None = None,
-        nudge: Callable[[], None] = lambda: None,
+        nudge: Callable[[], bool] = lambda: False,
     ) -> bool:
         """Whether a line after the first *since* fits, now or soon (within *seconds*, which then proves nothing).
 
-        *nudge* is called when nothing fits at once.
+        When nothing fits at once, *nudge* is called until something does, or it says that it can do no more.
         """
         lines = self._observer.lines
 
@@ -103,7 +104,8 @@ class _Ear:
 
         if not self._observer.until(heard, min(patience, PARTIAL_LINE_SECONDS)):
             self._observer.finish_lines()
-            nudge()
+            while self._misses < PATIENCE and nudge() and not self._observer.until(heard, NUDGE_SECONDS):
+                pass
             self._observer.until(over, patience)
         found = heard()
         if seconds is None:
@@ -132,7 +134,7 @@ def _conversation(observer: Observer, plan: ScenePlan) -> None:
         heard = {str(m.data) for m in observer.messages[-RECENT:] if m.topic == specification.text_topic.name}
         # The text that goes with this number may be printed before it is heard here: it is taken to look like the others.
         greetings = heard | {NUMBER.sub(str(number), text) for text in heard}
-        return ear.hears(lambda line: number in numbers_in(line, greetings), since, nudge=steps.half_step)
+        return ear.hears(lambda line: number in numbers_in(line, greetings), since, nudge=steps.nudge)
 
     if observer.alive():
         steps.play(_number_topic(observer), answer)
