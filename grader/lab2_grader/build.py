@@ -12,6 +12,7 @@ import configparser
 import errno
 import functools
 import io
+import platform
 import shutil
 import sys
 import tarfile
@@ -79,6 +80,7 @@ def build(submission: Submission, into: Path, ros: Ros, isolation: sandbox.Isola
         modules=_modules(prefix, package) if ok else (),
         launch_files=_launch_files(prefix / "share" / package) if ok else (),
         dangling=_dangling(prefix, package) if ok else (),
+        python=platform.python_version(),
     )
 
 

@@ -42,11 +42,16 @@ class Course(Record, frozen=True):
     grader_install_url: str
     workspace: str
     ros_distro: str
+    ros_python: str
     fail_workflow_on_lost_points: bool
 
     def __post_init__(self) -> None:
         """Refuse what nothing could follow."""
         _hold(1 <= self.week <= 52, f"week = {self.week}: a week is from 1 to 52")
+        _hold(
+            re.fullmatch(r"3\.\d+", self.ros_python) is not None,
+            f"ros_python = {self.ros_python!r}: give a version such as 3.12",
+        )
         _hold("@" in self.contact_email, f"contact_email = {self.contact_email!r}: that is no e-mail address")
         _hold(
             self.solutions_release.year in (self.year, self.year + 1),

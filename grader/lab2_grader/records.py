@@ -207,6 +207,7 @@ class Build(Record, frozen=True):
         modules: Python modules of the package that were installed, without the package's name, sorted.
         launch_files: Files below `share/lab2` that end in `.py`, `.xml`, `.yaml` or `.yml`, sorted.
         dangling: Executables whose entry point names a module of the package that was not installed, sorted.
+        python: Version of the Python that built it and runs it, such as `3.12.3`.
     """
 
     ok: bool
@@ -220,6 +221,7 @@ class Build(Record, frozen=True):
     modules: tuple[str, ...]
     launch_files: tuple[str, ...]
     dangling: tuple[str, ...]
+    python: str = ""
 
 
 # --- scenes: what an observer saw ---------------------------------------------------------------

@@ -274,6 +274,36 @@ def test_a_fault_of_ours_before_the_build_withholds_the_mark(solution: Evidence)
     assert {v.status for n, v in found.items() if not n.startswith("git")} == {Status.INCONCLUSIVE}
 
 
+@pytest.mark.parametrize(
+    ("error", "python", "status"),
+    [
+        ("SyntaxError: f-string: expecting '}'", "3.11.2", Status.INCONCLUSIVE),
+        ("SyntaxError: f-string: expecting '}'", "3.12.3", Status.FAIL),
+        ("SyntaxError: f-string: expecting '}'", "", Status.FAIL),  # evidence from before it was recorded
+        (
+            "ImportError: cannot import name 'override' from 'typing' (/usr/lib/typing.py)",
+            "3.10.12",
+            Status.INCONCLUSIVE,
+        ),
+        ("ImportError: cannot import name 'Int9' from 'std_msgs.msg'", "3.11.2", Status.FAIL),
+        ("SyntaxError: invalid syntax", "3.11.2", Status.FAIL),
+    ],
+)
+def test_what_only_an_older_python_refuses_is_not_the_student_s_fault(
+    error: str, python: str, status: Status, folder: Path
+) -> None:
+    def died(event: Event) -> Event:
+        is_error = isinstance(event, Line) and event.text.startswith("AttributeError")
+        return msgspec.structs.replace(event, text=error) if is_error else event
+
+    observed = with_events(recorded("listener-without-super", folder), SceneName.LISTENER, died)
+    assert observed.build is not None
+    observed = msgspec.structs.replace(observed, build=msgspec.structs.replace(observed.build, python=python))
+    found = verdicts(observed)["listener-numeric"]
+    assert found.status is status
+    assert error.split("(")[0].strip() in found.observed
+
+
 def test_what_our_launcher_does_not_know_is_ours(solution: Evidence) -> None:
     def unknown(scene: Scene) -> Scene:
         kept = tuple(event for event in scene.events if isinstance(event, Phase))

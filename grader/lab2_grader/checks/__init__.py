@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from lab2_grader import messages
-from lab2_grader.checks import launch, listener, originals, package, repository, talker
+from lab2_grader.checks import interpreter, launch, listener, originals, package, repository, talker
 from lab2_grader.checks.verdicts import blocked, inconclusive
 from lab2_grader.checks.view import View
 from lab2_grader.records import Evidence, Status, Verdict
@@ -39,14 +39,14 @@ def judge(evidence: Evidence) -> tuple[Verdict, ...]:
     view = View(evidence)
     verdicts: dict[str, Verdict] = {}
     for name, check in CHECKS:
-        verdicts[name] = _judge_one(name, check, view, verdicts)
+        verdicts[name] = interpreter.excused(view, _judge_one(name, check, view, verdicts))
     return tuple(verdicts.values())
 
 
 def _judge_one(name: str, check: Check, view: View, earlier: Mapping[str, Verdict]) -> Verdict:
     if name not in NEEDS_NO_BUILD:
         base = earlier["package-builds"]
-        if view.evidence.faults or base.status is Status.INCONCLUSIVE:
+        if view.evidence.faults or (view.build is None and base.status is Status.INCONCLUSIVE):
             fault = (*view.evidence.faults, messages.phrase("no-build"))[0]
             return inconclusive(name, "inconclusive-scene", fault=fault)
         if base.status is not Status.PASS:

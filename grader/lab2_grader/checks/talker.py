@@ -290,14 +290,14 @@ def _has_numbers(view: View) -> bool:
 def _unheard(check: str, view: View, earlier: Earlier) -> Verdict | None:
     """Why nothing can be said of the count; None when numbers were heard."""
     base, start = earlier["talker-type"], earlier.get("talker-start")
-    if base.status is Status.INCONCLUSIVE:
-        return inconclusive(check, "inconclusive-scene", fault=view.talking.scene.fault if view.talking else "")
+    if base.status is Status.INCONCLUSIVE and view.talking and view.talking.scene.fault:
+        return inconclusive(check, "inconclusive-scene", fault=view.talking.scene.fault)
     if start is not None and start.message in NO_NUMBERS:
         return blocked(check, "talker-start")
     if start is not None and start.because == ("talker-step",) and not view.numbers:
         return blocked(check, "talker-step")
     if view.numbers:
         return None
-    if base.status in (Status.FAIL, Status.BLOCKED):
+    if base.status is not Status.PASS:
         return blocked(check, *(base.because or ("talker-type",)))
     return failed(check, "silent")
