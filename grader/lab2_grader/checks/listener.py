@@ -49,9 +49,7 @@ def listener_numeric(view: View, earlier: Earlier) -> Verdict:
             return failed(check, "ended")
         if death == AT_START:
             error = scene.error_of(scene.scene.label)
-            key = "arguments" if NOT_ONE_ARGUMENT in error else "died"
-            key = "no-super" if source.is_of_rclpy(view, scene.scene.label, error) else key
-            return failed(check, key, file, line, error=error)
+            return failed(check, _why_it_died(view, scene, error, line), file, line, error=error)
         return blocked(check, "listener-chatter")
     if wrong := _unsuitable(check, topic.name, topic.type, view, scene):
         return wrong
@@ -120,6 +118,15 @@ def _death(scene: SceneView) -> str:
     if not scene.ended_by_itself(scene.scene.label):
         return ""
     return scene.sent[-1].topic if _handled_something(scene) else AT_START
+
+
+def _why_it_died(view: View, scene: SceneView, error: str, line: int) -> str:
+    """The fault of a listener that ended with *error* before anything was sent; *line* of its file, 0 for none."""
+    if source.is_of_rclpy(view, scene.scene.label, error):
+        return "no-super"
+    if error.startswith(source.UNREADABLE) and line:
+        return "syntax"
+    return "arguments" if NOT_ONE_ARGUMENT in error else "died"
 
 
 def _handled_something(scene: SceneView) -> bool:

@@ -40,7 +40,7 @@ def package_builds(view: View, earlier: Earlier) -> Verdict:
     error, file, line = _last_error(build)
     if file == READ_BY_COLCON:
         return failed(check, "prints")
-    if line and error.startswith(("SyntaxError", "IndentationError", "TabError")):
+    if line and error.startswith(source.UNREADABLE):
         return failed(check, "syntax", file=file, line=line, error=error)
     file, line = source.joined_entry_points(view)
     if line:

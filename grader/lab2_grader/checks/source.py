@@ -12,6 +12,7 @@ Place = tuple[str, int]  # file within the package, line from 1
 NOWHERE: Place = ("", 0)
 PRIVATE = re.compile(r"object has no attribute '(_[a-z]\w*)'")
 HIDING = ("throttle_duration_sec", "once", "skip_first")  # arguments of the logger with which not every line is shown
+UNREADABLE = ("SyntaxError", "IndentationError", "TabError")
 ENTRY_POINT = re.compile(r"[\w-]+\s*=\s*[\w.]+:")  # name = package.module:function
 
 

@@ -25,7 +25,7 @@ DEATHS = {
 }
 # Faults of talker-start that leave nothing to count.
 NO_NUMBERS = ("silent", "died", "wrong-message", "wrong-data", "no-self")
-AT_CREATION = ("ended", "no-setter", "no-super", "two-types")
+AT_CREATION = ("ended", "no-setter", "no-super", "two-types", "syntax")
 NOT_CALLABLE = "'NoneType' object is not callable"
 SILENT_SECONDS = 3.0  # no message for so long before the scene was stopped: it had stopped by itself
 
@@ -86,7 +86,10 @@ def _death(view: View) -> _Death | None:
         key = "no-super"
     else:
         key = next((key for text, key in DEATHS.items() if text in error), "died")
-    return _Death(key, error, *scene.place_of_error(name, view.specification.package))
+    place = scene.place_of_error(name, view.specification.package)
+    if error.startswith(source.UNREADABLE) and place[1]:
+        key = "syntax"
+    return _Death(key, error, *place)
 
 
 def _shows_publishers(view: View) -> bool:
