@@ -224,7 +224,7 @@ class LockStep:
             took = time.monotonic() - began
         # The interval after the first jump may be short of a whole period, so it does not count. A late answer makes one look
         # longer, and the next one shorter. A step that is too long would let a timer fire twice, one that is too short only
-        # not at all; the average of many tells the period then.
+        # not at all; what most tens of ticks say is the period then.
         self._period = round(min(intervals[1:]) * PROBE_SECONDS, 6)
         self._follows = self._stands_still(max(HOLD_SECONDS, 1.5 * took))
         if self._follows and self._period != lab.specification().text_topic.period_seconds:

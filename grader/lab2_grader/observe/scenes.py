@@ -181,7 +181,7 @@ class _Post:
         self._publisher = observer.publisher(topic, type_name)
         self._warm_up, *self._pending = data
         self._ear = ear
-        self.waits: list[float] = []  # for each answer, or for none
+        self.waits: list[float] = []  # for each answer, in seconds
 
     def prepare(self) -> None:
         """Find the subscription and warm up; without one, or when the listener ends over it, nothing is pending."""
@@ -210,8 +210,8 @@ class _Post:
     def send_next(self) -> None:
         """Send one and wait for the answer."""
         began = time.monotonic()
-        self._send(self._pending.pop(0))
-        self.waits.append(time.monotonic() - began)
+        if self._send(self._pending.pop(0)):
+            self.waits.append(time.monotonic() - began)
 
     def send_at_pace(self, data: tuple[int | str, ...], seconds: float) -> None:
         """Send *data*, so many *seconds* apart, answered or not, and then wait for the answers.
