@@ -51,9 +51,11 @@ except ImportError:
 print('LOOKED for the grader', flush=True)
 """
 
+# Not /dev/shm, which has an animal of its own: middleware keeps messages there (Fast DDS, data sharing), so that it is
+# luck whether the other program of the pair is hit, too.
 FILLER = """
 import os
-for _place in ('/tmp', os.path.expanduser('~'), '/dev/shm', '/dev', '/ws', '/', '.', '/var/tmp', '/run'):
+for _place in ('/tmp', os.path.expanduser('~'), '/dev', '/ws', '/', '.', '/var/tmp', '/run'):
     for _index in range(20):
         try:
             with open(f'{_place}/hoard{_index}', 'wb') as _file:
