@@ -285,7 +285,10 @@ def test_a_fault_of_ours_before_the_build_withholds_the_mark(solution: Evidence)
             "3.10.12",
             Status.INCONCLUSIVE,
         ),
+        ("AttributeError: module 'itertools' has no attribute 'batched'", "3.11.2", Status.INCONCLUSIVE),
         ("ImportError: cannot import name 'Int9' from 'std_msgs.msg'", "3.11.2", Status.FAIL),
+        ("ImportError: cannot import name 'UTC' from 'lab2.clock'", "3.11.2", Status.FAIL),
+        ("AttributeError: 'NumericListener' object has no attribute 'timeout'", "3.11.2", Status.FAIL),
         ("SyntaxError: invalid syntax", "3.11.2", Status.FAIL),
     ],
 )

@@ -9,16 +9,32 @@ from lab2_grader.checks.verdicts import inconclusive
 from lab2_grader.checks.view import View
 from lab2_grader.records import Status, Verdict
 
-# Names of the standard library since Python 3.11 and 3.12 ("What's New in Python").
-NEWER = (
-    *("StrEnum", "ReprEnum", "verify", "UTC", "Self", "Never", "LiteralString", "assert_never", "assert_type"),
-    *("reveal_type", "TaskGroup", "Runner", "timeout", "Barrier", "chdir", "tomllib", "getencoding"),
-    *("override", "TypeAliasType", "batched", "sumprod", "Buffer"),
-)
+# Names that the standard library has since Python 3.11 or 3.12 ("What's New in Python"), by module.
+NEWER = {
+    "asyncio": ("Barrier", "Runner", "TaskGroup", "timeout"),
+    "collections.abc": ("Buffer",),
+    "contextlib": ("chdir",),
+    "datetime": ("UTC",),
+    "enum": ("ReprEnum", "StrEnum", "verify"),
+    "itertools": ("batched",),
+    "locale": ("getencoding",),
+    "math": ("sumprod",),
+    "typing": (
+        *("LiteralString", "Never", "Self", "TypeAliasType"),
+        *("assert_never", "assert_type", "override", "reveal_type"),
+    ),
+}
+NEWER_MODULE = "No module named 'tomllib'"
 # What may stand in an f-string, and its very syntax, grew with Python 3.12 (PEP 701).
 FSTRING = "SyntaxError: f-string"
-MISSED = ("cannot import name", "has no attribute", "No module named")
-ONLY_OLDER = re.compile(f"{FSTRING}|(?:{'|'.join(MISSED)}) '(?:{'|'.join(NEWER)})'")
+
+
+def _missed(module: str, names: tuple[str, ...]) -> str:
+    name = "|".join(names)
+    return f"cannot import name '({name})' from '{module}'|module '{module}' has no attribute '({name})'"
+
+
+ONLY_OLDER = re.compile("|".join((FSTRING, NEWER_MODULE, *(_missed(*entry) for entry in NEWER.items()))))
 
 
 def excused(view: View, verdict: Verdict) -> Verdict:
@@ -26,9 +42,10 @@ def excused(view: View, verdict: Verdict) -> Verdict:
 
     The same submission gets the same verdicts wherever it is graded (VERDICTS, general rule 4).
     """
-    wanted, build = lab.course().ros_python, view.build
+    build = view.build
     if verdict.status is not Status.FAIL or build is None or not ONLY_OLDER.search(verdict.observed):
         return verdict
+    wanted = lab.course().ros_python
     if not build.python or _version(build.python) >= _version(wanted):
         return verdict
     return inconclusive(
