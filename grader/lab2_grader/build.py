@@ -251,9 +251,8 @@ def _defines(path: Path, name: str) -> bool:
             return True
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name == name:
             return True
-        if not isinstance(
-            node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
-        ):  # what is in there is not at the top
+        # What stands in a function or a class is not at the top.
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             pending += ast.iter_child_nodes(node)
     return False
 

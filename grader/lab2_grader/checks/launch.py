@@ -27,15 +27,10 @@ COMMON_ERRORS = {
 }
 ONLY_ONE = ("died", "called", "once")  # faults of talker-step after a single number: it is luck whether others hear it
 NEARBY, NEARBY_PER_MESSAGE = 100, 2  # lines that can belong to a message: so many, and so many for each before it
-MISLED = ("dangling", "wrong-module", "misplaced", "function", "no-function", "class", "indented")  # an entry point
-NOT_WHAT_IT_RECEIVES = (
-    "silent",
-    "constant",
-    "others",
-    "noise",
-    "no-f-string",
-    "paced",
-)  # a listener whose lines answer nothing
+# Faults of an entry point that does not lead to its program.
+MISLED = ("dangling", "wrong-module", "misplaced", "function", "no-function", "class", "indented")
+# Faults of a listener whose lines do not answer what it receives.
+NOT_WHAT_IT_RECEIVES = ("silent", "constant", "others", "noise", "no-f-string", "paced")
 QUEUE_FULL = 8  # numbers that wait for a listener whose queue holds ten, as in the worksheet: others may be lost by now
 ENOUGH_ANSWERS = 8  # of the slow dozen; the first few may be lost while the pair still discovers each other
 

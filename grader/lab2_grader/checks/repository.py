@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 import shlex
 from collections.abc import Mapping
@@ -66,5 +65,6 @@ def git_clean(view: View, earlier: Earlier) -> Verdict:
 def _arguments(paths: tuple[str, ...]) -> str:
     """*paths* for a command line, as many as fit: each whole, for beside it may lie the student's own work."""
     words = [shlex.quote(path.rstrip("/")) for path in paths]
-    fit = itertools.accumulate(words, lambda length, word: length + 1 + len(word), initial=0)
-    return " ".join(word for word, length in zip(words, list(fit)[1:], strict=True) if length <= messages.VALUE_LENGTH)
+    while len(" ".join(words)) > messages.VALUE_LENGTH:
+        words.pop()
+    return " ".join(words)

@@ -261,15 +261,19 @@ class LockStep:
         """
         early = 0
         while self._period > PROBE_SECONDS and not self._ahead:
-            before, self._ahead = len(self._heard()), round(self._period - PROBE_SECONDS, 6)
-            self._advance(self._ahead)
-            if self._wait(before, HOLD_SECONDS):
+            if self._comes_early(HOLD_SECONDS):
                 early, self._ahead = early + 1, 0.0
                 self._settle(STEP_WAIT_SECONDS)
             if early == 2:
                 probes = round(self._period / PROBE_SECONDS)
                 self._period = round((probes - max(1, probes // 10)) * PROBE_SECONDS, 6)
                 early = 0
+
+    def _comes_early(self, seconds: float) -> bool:
+        """Whether a message comes, within *seconds*, when the clock has moved a little less than the period."""
+        before, self._ahead = len(self._heard()), round(self._period - PROBE_SECONDS, 6)
+        self._advance(self._ahead)
+        return self._wait(before, seconds)
 
     def _refine_period(self) -> None:
         """Record what most tens of ticks say instead; 0, which says nothing, when that is far from what was measured.
@@ -284,9 +288,7 @@ class LockStep:
         period = round(statistics.median(spans) / WINDOW / PROBE_SECONDS) * PROBE_SECONDS
         agrees = abs(period - self._period) <= max(FAR * self._period, PROBE_SECONDS / 2)
         if agrees and self._period > PROBE_SECONDS:
-            before = len(self._heard())
-            self._advance(self._period - PROBE_SECONDS)
-            agrees = not self._wait(before, STEP_WAIT_SECONDS)
+            agrees = not self._comes_early(STEP_WAIT_SECONDS)
         self._record("period_seconds", round(period, 2) if agrees else 0.0)
 
     def _begin_real_time(self) -> None:
